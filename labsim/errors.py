@@ -1,0 +1,31 @@
+"""What can go wrong, as exceptions whose text is one line that a user can act on.
+
+Every message has the form ``FILE: KEY: what is wrong and what would be right``; the command line prints it
+after ``error:`` and leaves with status 2.
+"""
+
+from __future__ import annotations
+
+
+class LabsimError(Exception):
+    """Anything labsim reports to its user instead of a traceback."""
+
+    def __init__(self, where: object, key: str, message: str) -> None:
+        self.where, self.key, self.message = str(where), key, message
+        super().__init__(": ".join(part for part in (self.where, self.key, message) if part))
+
+
+class CampaignError(LabsimError):
+    """A campaign folder that cannot be used as it stands."""
+
+
+class MeasurementError(LabsimError):
+    """A video, a track or a stack of slices from which nothing trustworthy can be read."""
+
+
+class SimulationError(LabsimError):
+    """A setting that cannot be simulated, or a run that blew up (named with its parameters)."""
+
+
+class InferenceError(LabsimError):
+    """A calibration or a diagnosis that has nothing to stand on."""

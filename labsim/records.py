@@ -1,0 +1,223 @@
+"""The nouns of labsim: frozen records, everything in SI.
+
+Input: nothing but numbers. Output: nothing but numbers. Files are read in ``campaign``, ``video`` and ``ct``;
+physics is done in ``sph``. A record only holds what was stated or measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+Tip = Literal["hemisphere", "sphere", "cylinder"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A value with its standard uncertainty, in the same SI unit."""
+
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The dust as prepared."""
+
+    filling_factor: float
+    filling_factor_sigma: float
+    monomer_density: float  # kg/m^3, of the solid grains
+    diameter: float  # m
+    depth: float  # m
+    gas_pressure: float  # Pa
+
+
+@dataclass(frozen=True)
+class Material:
+    """Strengths and elasticity of the dust (campaign.toml ``[material]``), p_m included.
+
+    Σ(φ) = p_m ((φ - φ1)/(φ2 - φ))^(Δ ln 10); T(φ) = -10^(a + b φ) Pa; Y = shear_factor √(Σ|T|);
+    K(φ) = bulk_modulus (φ/0.15)^bulk_exponent; μ = shear_to_bulk K. Source: Güttler et al. (2009), eqs. 3-5.
+    """
+
+    p_m: float = 1300.0  # Pa
+    phi_1: float = 0.12
+    phi_2: float = 0.58
+    delta: float = 0.58
+    tensile_log10_a: float = 2.8
+    tensile_log10_b: float = 1.48
+    shear_factor: float = 1.0
+    bulk_modulus: float = 45.0e3  # Pa, at filling factor 0.15
+    bulk_exponent: float = 4.0
+    shear_to_bulk: float = 0.5
+    contact_friction: float = 0.0
+
+    def replace(self, **changes: float) -> Material:
+        return replace(self, **changes)
+
+
+@dataclass(frozen=True)
+class Projectile:
+    """A rigid projectile. A hemisphere is the end of a rod of the same radius; a cylinder is planar only."""
+
+    tip: Tip
+    tip_radius: float  # m
+    mass: float  # kg (planar: kg per metre of cylinder)
+    mass_sigma: float = 0.0
+    length: float = 0.0  # m, of the whole rod; 0 where it does not matter
+
+
+@dataclass(frozen=True)
+class Camera:
+    frame_rate: float  # Hz
+    pixel_size: float  # m
+    surface_row: float  # px, rows grow downwards
+    surface_row_sigma: float  # px
+
+
+@dataclass(frozen=True)
+class Record:
+    """Where the record of a drop is: ``kind`` is "track", "video" or "summary"."""
+
+    kind: Literal["track", "video", "summary"]
+    path: Path | None = None
+    row_sigma: float | None = None  # px
+
+
+@dataclass(frozen=True)
+class Published:
+    """Published figures of one drop (record.kind = "summary"); None where the source gives none."""
+
+    penetration_depth: Measured | None = None  # m
+    stopping_time: Measured | None = None  # s
+    impact_speed: Measured | None = None  # m/s
+
+
+@dataclass(frozen=True)
+class Drop:
+    name: str
+    projectile: Projectile
+    sequence: int
+    height: Measured | None  # m, free fall of the tip above the surface
+    camera: Camera | None
+    record: Record
+    published: Published | None = None
+
+
+@dataclass(frozen=True)
+class GreyCalibration:
+    """grey = grey_air + grey_per_density · ρ, levels past the top of the range saturate."""
+
+    grey_air: float
+    grey_per_density: float  # per kg/m^3
+    density_solid: float  # kg/m^3
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One CT scan of an embedded bead."""
+
+    name: str
+    projectile: Projectile
+    speed: Measured  # m/s at contact
+    slices: Path
+    voxel: float  # m
+    first_slice: Literal["top", "bottom"]
+    bits: int
+    calibration: GreyCalibration
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """One series of drops into one kind of sample, as read from its folder (campaign.read_campaign)."""
+
+    folder: Path
+    name: str
+    description: str
+    sample: Sample
+    material: Material  # nominal; its p_m is the geometric middle of p_m_range
+    p_m_range: tuple[float, float]  # Pa, the prior's limits
+    gravity: float  # m/s^2 in the nominal model
+    geometry: Literal["axisymmetric", "planar"]
+    drops: tuple[Drop, ...]
+    scans: tuple[Scan, ...]
+    extra: dict = field(default_factory=dict)  # further tables of campaign.toml, kept as read
+
+
+@dataclass(frozen=True)
+class Track:
+    """Rows of the projectile's tip, one entry per trusted or rejected frame.
+
+    frame : (n,) int; time : (n,) s; tip_row, sigma : (n,) px; valid : (n,) bool; reason : (n,) str, "" where valid.
+    """
+
+    frame: npt.NDArray[np.int64]
+    time: FloatArray
+    tip_row: FloatArray
+    sigma: FloatArray
+    valid: npt.NDArray[np.bool_]
+    reason: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class DecelerationCurve:
+    """Motion of the tip below the undisturbed surface; arrays of shape (n,), time zero at contact.
+
+    depth, depth_sigma : m; velocity, velocity_sigma : m/s (downwards positive);
+    acceleration, acceleration_sigma : m/s^2.
+    """
+
+    time: FloatArray
+    depth: FloatArray
+    depth_sigma: FloatArray
+    velocity: FloatArray
+    velocity_sigma: FloatArray
+    acceleration: FloatArray
+    acceleration_sigma: FloatArray
+    contact_time: Measured  # s, on the track's clock
+    impact_speed: Measured  # m/s
+    penetration_depth: Measured  # m
+    stopping_time: Measured  # s, contact to the first v = 0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FillingMap:
+    """Azimuthal mean of the filling factor about the axis of penetration.
+
+    r : (nr,) m, cell centres; z : (nz,) m, cell centres, 0 at the undisturbed surface, negative below;
+    filling_factor, sigma : (nz, nr), NaN where nothing was averaged; count : (nz, nr) voxels in the mean.
+    """
+
+    r: FloatArray
+    z: FloatArray
+    filling_factor: FloatArray
+    sigma: FloatArray
+    count: FloatArray
+    tip_depth: float  # m, lowest point of the bead below the undisturbed surface, positive
+    bead_radius: float  # m
+    axis_px: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CompressedVolume:
+    """Volume compacted beyond a filling factor; arrays of shape (n,).
+
+    filling_factor : thresholds; volume, sigma : m^3 of dust with a larger filling factor.
+    """
+
+    filling_factor: FloatArray
+    volume: FloatArray
+    sigma: FloatArray
+    sphere_volume: float  # m^3, of the projectile's tip sphere
+
+
+__all__ = [name for name, thing in list(globals().items()) if isinstance(thing, type) and thing.__module__ == __name__]

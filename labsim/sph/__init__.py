@@ -1,0 +1,1 @@
+"""The bundled SPH solver: a drop setting in, depth against time and the filling factor out. SI throughout."""

@@ -1,0 +1,1 @@
+"""Pixels in, a track and a deceleration curve out."""
