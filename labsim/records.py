@@ -108,6 +108,9 @@ class Drop:
     camera: Camera | None
     record: Record
     published: Published | None = None
+    source: dict = field(
+        default_factory=dict
+    )  # [source] as written: where each figure comes from, what is assumed
 
 
 @dataclass(frozen=True)
@@ -134,6 +137,34 @@ class Scan:
 
 
 @dataclass(frozen=True)
+class PublishedScan:
+    """A published compaction figure instead of slices: volume of dust between two filling factors."""
+
+    name: str
+    projectile: Projectile
+    speed: Measured  # m/s at contact
+    filling_factor_low: float
+    filling_factor_high: float
+    sphere_volumes: Measured  # compacted volume in volumes of the projectile's sphere
+    source: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Planar:
+    """How a planar run of a cylinder stands for a drop of a round projectile (campaign.toml ``[planar]``).
+
+    ``depth_reading``: "multiply_exp" compares the raw planar depth with 8/(3π) times the measured one (as the seed
+    does), "multiply_sim" compares 8/(3π) times the raw depth with the measured one, "none" compares them as they are.
+    """
+
+    depth_reading: Literal["multiply_exp", "multiply_sim", "none"] = "multiply_exp"
+    calibration_drops: tuple[str, ...] = ()  # names of the drops that are calibrated on; empty = all
+    box_width: float = 8.0e-3  # m, of the planar box for the reference radius; scales with the radius
+    box_depth: float = 5.0e-3
+    box_radius: float = 0.55e-3  # m, the radius that the box belongs to
+
+
+@dataclass(frozen=True)
 class Campaign:
     """One series of drops into one kind of sample, as read from its folder (campaign.read_campaign)."""
 
@@ -147,7 +178,9 @@ class Campaign:
     geometry: Literal["axisymmetric", "planar"]
     drops: tuple[Drop, ...]
     scans: tuple[Scan, ...]
-    extra: dict = field(default_factory=dict)  # further tables of campaign.toml, kept as read
+    published_scans: tuple[PublishedScan, ...] = ()
+    planar: Planar = Planar()
+    source: dict = field(default_factory=dict)  # campaign.toml [source] as written
 
 
 @dataclass(frozen=True)
@@ -220,4 +253,8 @@ class CompressedVolume:
     sphere_volume: float  # m^3, of the projectile's tip sphere
 
 
-__all__ = [name for name, thing in list(globals().items()) if isinstance(thing, type) and thing.__module__ == __name__]
+__all__ = [
+    name
+    for name, thing in list(globals().items())
+    if isinstance(thing, type) and thing.__module__ == __name__
+]

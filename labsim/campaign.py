@@ -1,0 +1,449 @@
+"""A campaign folder in, a checked Campaign out.
+
+Input: a folder as docs/campaign-format.md describes it. Output: records in SI. Nothing is computed and nothing is
+written; every mistake is a CampaignError that names file, key, value and remedy.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+from .errors import CampaignError
+from .records import (
+    Camera,
+    Campaign,
+    Drop,
+    GreyCalibration,
+    Material,
+    Planar,
+    Projectile,
+    Published,
+    PublishedScan,
+    Record,
+    Sample,
+    Scan,
+)
+from .tables import Document, Table
+
+SLICE_SUFFIXES = {".tif", ".tiff", ".png", ".bmp"}
+# densities between which a projectile is believed, kg/m^3: a hollow tube up to osmium
+LIGHTEST, HEAVIEST = 20.0, 23000.0
+
+
+def read_campaign(folder: Path | str) -> Campaign:
+    """Read and check a whole campaign folder. Raises CampaignError."""
+    folder = Path(folder)
+    if not folder.exists():
+        raise CampaignError(folder, "", "no such folder; give the folder that holds campaign.toml")
+    if folder.name == "campaign.toml" and folder.is_file():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise CampaignError(folder, "", "is not a folder; give the folder that holds campaign.toml")
+    document = Document(folder / "campaign.toml")
+    top = document.top()
+    if (version := top.get("format")) != 1 or isinstance(version, bool):
+        raise top.wrong("format", f"{version!r} is not a format this labsim reads; write 1")
+    name, description = top.text("name"), top.text("description", "")
+    sample = _read_sample(document.table("sample"))
+    material, p_m_range = _read_material(document.table("material"), sample)
+    model = document.table("model", required=False)
+    gravity = model.number("gravity_m_s2", 0.0, 30.0, default=9.81)
+    geometry = model.choice("geometry", ("axisymmetric", "planar"), "axisymmetric")
+    planar = _read_planar(document.table("planar", required=False))
+    source = _read_source(document)
+    document.close()
+
+    drops = tuple(read_drop(path) for path in _list_parts(folder / "drops", "drop.toml"))
+    if not drops:
+        raise CampaignError(folder / "drops", "", "holds no drop; add drops/D01/drop.toml")
+    scans, published_scans = [], []
+    for path in _list_parts(folder / "ct", "scan.toml"):
+        scan = read_scan(path)
+        (scans if isinstance(scan, Scan) else published_scans).append(scan)
+    _check_sequence(folder, drops)
+    for wanted in planar.calibration_drops:
+        if wanted not in {drop.name for drop in drops}:
+            raise CampaignError(
+                folder / "campaign.toml",
+                "planar.calibration_drops",
+                f'"{wanted}" is not a drop; the drops are ' + ", ".join(drop.name for drop in drops),
+            )
+    return Campaign(
+        folder=folder,
+        name=name,
+        description=description,
+        sample=sample,
+        material=material,
+        p_m_range=p_m_range,
+        gravity=gravity,
+        geometry=geometry,
+        drops=drops,
+        scans=tuple(scans),
+        published_scans=tuple(published_scans),
+        planar=planar,
+        source=source,
+    )
+
+
+def read_drop(path: Path | str) -> Drop:
+    """Read one drop: its folder or its drop.toml. Raises CampaignError."""
+    file = _toml_of(Path(path), "drop.toml")
+    document = Document(file)
+    document.top()
+    record_table = document.table("record")
+    kind = record_table.choice("kind", ("track", "video", "summary"))
+    projectile = _read_projectile(document.table("projectile"))
+    drop = document.table("drop", required=kind != "summary")
+    sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" else drop.number(
+        "sequence", 0, 100000, whole=True
+    )  # fmt: skip
+    height = drop.measured("height_mm", 0.0, 5000.0, unit=1e-3, required=kind != "summary")
+    camera, published = None, None
+    if kind == "summary":
+        if document.has("camera"):
+            raise CampaignError(file, "[camera]", 'does not belong to a record of kind "summary"; remove it')
+        record = Record(kind="summary")
+        if record_table.has("file"):
+            record_table.get("file")
+        published = _read_published(document.table("published"), height is not None)
+    else:
+        if document.has("published"):
+            raise CampaignError(
+                file, "[published]", f'belongs to kind = "summary" only, not to "{kind}"; remove it'
+            )
+        camera = _read_camera(document.table("camera"))
+        data = _existing(record_table, file.parent, folder_allowed=kind == "video")
+        record = Record(
+            kind=kind,  # type: ignore[arg-type]
+            path=data,
+            row_sigma=record_table.number("row_sigma_px", 1e-6, 50.0, default=None),
+        )
+    source = _read_source(document)
+    document.close()
+    if kind == "track":
+        check_track_file(record.path, camera.surface_row)  # type: ignore[arg-type, union-attr]
+    return Drop(
+        name=file.parent.name,
+        projectile=projectile,
+        sequence=sequence,
+        height=height,
+        camera=camera,
+        record=record,
+        published=published,
+        source=source,
+    )
+
+
+def read_scan(path: Path | str) -> Scan | PublishedScan:
+    """Read one CT scan: its folder or its scan.toml. Published figures instead of slices give a PublishedScan."""
+    file = _toml_of(Path(path), "scan.toml")
+    document = Document(file)
+    document.top()
+    projectile = _read_bead(document.table("projectile"))
+    speed = document.table("drop").measured("speed_m_s", 1e-3, 100.0)
+    assert speed is not None
+    source = _read_source(document)
+    if document.has("published"):
+        table = document.table("published")
+        low = table.number("filling_factor_low", 0.01, 0.74)
+        high = table.number("filling_factor_high", 0.01, 1.0)
+        if high <= low:
+            raise table.wrong(
+                "filling_factor_high", f"{high:g} is not above filling_factor_low = {low:g}; raise it"
+            )
+        volume = table.measured("compacted_volume_sphere_volumes", 0.0, 100.0)
+        assert volume is not None
+        document.close()
+        return PublishedScan(file.parent.name, projectile, speed, low, high, volume, source)
+    table = document.table("scan")
+    slices = file.parent / table.text("slices")
+    voxel = table.number("voxel_um", 0.1, 1000.0, unit=1e-6)
+    first = table.choice("first_slice", ("top", "bottom"))
+    bits = table.number("bits", 8, 16, whole=True)
+    if bits not in (8, 16):
+        raise table.wrong("bits", f"{bits} is not 8 or 16; write the depth of the slice images")
+    grey = document.table("calibration")
+    calibration = GreyCalibration(
+        grey_air=grey.number("grey_air", -70000.0, 70000.0),
+        grey_per_density=grey.number("grey_per_density", 1e-6, 1e3),
+        density_solid=grey.number("density_solid_kg_m3", 100.0, 23000.0),
+    )
+    document.close()
+    if not slices.is_dir():
+        raise table.wrong("slices", f"{slices} is not a folder; name the folder of the slice images")
+    if not any(p.suffix.lower() in SLICE_SUFFIXES for p in slices.iterdir()):
+        raise table.wrong("slices", f"{slices} holds no TIFF, PNG or BMP image; put the slices there")
+    return Scan(file.parent.name, projectile, speed, slices, voxel, first, bits, calibration)  # type: ignore[arg-type]
+
+
+def check_track_file(path: Path, surface_row: float) -> None:
+    """See that a track can be used: a header, numbers, and rows that reach below the surface. Raises CampaignError."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
+    except (OSError, UnicodeDecodeError) as trouble:
+        raise CampaignError(
+            path, "", f"cannot be read ({trouble}); give a CSV file with frame,tip_row_px"
+        ) from None
+    header = [name.strip() for name in rows[0]] if rows else []
+    for column in ("frame", "tip_row_px"):
+        if column not in header:
+            raise CampaignError(
+                path, column, "this column is missing; the first line must be frame,tip_row_px"
+            )
+    if len(rows) == 1:
+        raise CampaignError(path, "", "the track is empty; it needs one row per frame")
+    at_frame, at_row = header.index("frame"), header.index("tip_row_px")
+    previous, deepest = -math.inf, -math.inf
+    for number, row in enumerate(rows[1:], start=2):
+        for column, place in (("frame", at_frame), ("tip_row_px", at_row)):
+            text = row[place].strip() if place < len(row) else ""
+            try:
+                value = float(text)
+            except ValueError:
+                raise CampaignError(
+                    path, column, f"line {number}: {text!r} is not a number; correct or remove it"
+                ) from None
+            if not math.isfinite(value):
+                raise CampaignError(path, column, f"line {number}: {text} is not finite; leave the frame out")
+            if column == "frame":
+                if value <= previous:
+                    raise CampaignError(
+                        path, column, f"line {number}: {text} does not follow {previous:g}; sort the frames"
+                    )
+                previous = value
+            else:
+                deepest = max(deepest, value)
+    if deepest <= surface_row:
+        raise CampaignError(
+            path,
+            "tip_row_px",
+            f"the track never reaches the surface (largest row {deepest:g}, surface_row_px {surface_row:g}); "
+            "rows grow downwards: check surface_row_px",
+        )
+
+
+def describe_campaign(campaign: Campaign) -> dict[str, Any]:
+    """What ``labsim check`` says: counts, and ``text`` for people."""
+    kinds: dict[str, int] = {}
+    for drop in campaign.drops:
+        kinds[drop.record.kind] = kinds.get(drop.record.kind, 0) + 1
+    radii = sorted({drop.projectile.tip_radius for drop in campaign.drops})
+    assumed = [f"{d.name}: {d.source['assumed']}" for d in campaign.drops if d.source.get("assumed")]
+    low, high = campaign.p_m_range
+    lines = [
+        f"{campaign.name}: {campaign.description}".rstrip(": "),
+        f"  dust: filling factor {campaign.sample.filling_factor:g} ± {campaign.sample.filling_factor_sigma:g}, "
+        f"{campaign.sample.diameter * 1e3:g} mm wide, {campaign.sample.depth * 1e3:g} mm deep, "
+        f"gas {campaign.sample.gas_pressure:g} Pa",
+        f"  model: {campaign.geometry}, gravity {campaign.gravity:g} m/s², p_m between {low / 1e3:g} and {high / 1e3:g} kPa",
+        f"  {len(campaign.drops)} drops (" + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) + "), tip radii "
+        + ", ".join(f"{r * 1e3:g} mm" for r in radii),
+        f"  {len(campaign.scans)} CT scans with slices, {len(campaign.published_scans)} published compaction figures",
+    ]  # fmt: skip
+    if assumed:
+        lines.append(
+            f"  {len(assumed)} drops rest on assumed figures; each drop.toml says which and why under [source]"
+        )
+    lines.append("nothing is wrong with its files")
+    return {
+        "campaign": campaign.name,
+        "drops": len(campaign.drops),
+        "kinds": kinds,
+        "scans": len(campaign.scans),
+        "published_scans": len(campaign.published_scans),
+        "tip_radii_m": radii,
+        "assumed": assumed,
+        "warnings": [],
+        "text": "\n".join(lines),
+    }
+
+
+def _read_sample(table: Table) -> Sample:
+    return Sample(
+        filling_factor=table.number("filling_factor", 0.01, 0.74),
+        filling_factor_sigma=table.number("filling_factor_sigma", 0.0, 0.1),
+        monomer_density=table.number("monomer_density_kg_m3", 100.0, 23000.0),
+        diameter=table.number("diameter_mm", 1.0, 1000.0, unit=1e-3),
+        depth=table.number("depth_mm", 0.5, 1000.0, unit=1e-3),
+        gas_pressure=table.number("gas_pressure_Pa", 0.0, 1e6),
+    )
+
+
+def _read_material(table: Table, sample: Sample) -> tuple[Material, tuple[float, float]]:
+    p_m_range = table.get("p_m_range_Pa")
+    if not isinstance(p_m_range, list) or len(p_m_range) != 2:
+        raise table.wrong(
+            "p_m_range_Pa", f"{p_m_range!r} is not a range; write two pressures in Pa as [300.0, 6000.0]"
+        )
+    for value in p_m_range:
+        table.check_number("p_m_range_Pa", value, 1.0, 1e8)
+    low, high = map(float, p_m_range)
+    if high <= low:
+        raise table.wrong("p_m_range_Pa", f"{p_m_range} does not grow; write the smaller pressure first")
+    material = Material(
+        p_m=math.sqrt(low * high),
+        phi_1=table.number("phi_1", 0.0, 0.74),
+        phi_2=table.number("phi_2", 0.01, 1.0),
+        delta=table.number("delta", 0.01, 5.0),
+        tensile_log10_a=table.number("tensile_log10_a", -5.0, 9.0),
+        tensile_log10_b=table.number("tensile_log10_b", -20.0, 20.0),
+        shear_factor=table.number("shear_factor", 0.0, 100.0),
+        bulk_modulus=table.number("bulk_modulus_Pa", 100.0, 1e9),
+        bulk_exponent=table.number("bulk_exponent", 0.0, 15.0),
+        shear_to_bulk=table.number("shear_to_bulk", 1e-3, 1.5),
+        contact_friction=table.number("contact_friction", 0.0, 5.0),
+    )
+    if material.phi_2 <= material.phi_1:
+        raise table.wrong("phi_2", f"{material.phi_2:g} is not above phi_1 = {material.phi_1:g}; raise it")
+    phi = sample.filling_factor
+    where = CampaignError(table.file, "sample.filling_factor", "")
+    if phi >= material.phi_2:
+        raise CampaignError(
+            where.where,
+            where.key,
+            f"{phi:g} is not below material.phi_2 = {material.phi_2:g}, where Σ diverges; lower it",
+        )
+    if phi <= material.phi_1:
+        raise CampaignError(
+            where.where,
+            where.key,
+            f"{phi:g} is not above material.phi_1 = {material.phi_1:g}, where Σ vanishes; raise it",
+        )
+    return material, (low, high)
+
+
+def _read_planar(table: Table) -> Planar:
+    default = Planar()
+    names = table.get("calibration_drops", [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise table.wrong("calibration_drops", f'{names!r} is not a list of drop names; write ["D01"]')
+    return Planar(
+        depth_reading=table.choice(
+            "depth_reading", ("multiply_exp", "multiply_sim", "none"), default.depth_reading
+        ),  # type: ignore[arg-type]
+        calibration_drops=tuple(names),
+        box_width=table.number("box_width_mm", 1.0, 500.0, unit=1e-3, default=default.box_width),
+        box_depth=table.number("box_depth_mm", 1.0, 500.0, unit=1e-3, default=default.box_depth),
+        box_radius=table.number("box_radius_mm", 0.05, 50.0, unit=1e-3, default=default.box_radius),
+    )
+
+
+def _read_projectile(table: Table) -> Projectile:
+    tip = table.choice("tip", ("hemisphere", "sphere"))
+    projectile = Projectile(
+        tip=tip,  # type: ignore[arg-type]
+        tip_radius=table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3),
+        length=table.number("length_mm", 0.1, 500.0, unit=1e-3, default=0.0),
+        mass=table.number("mass_mg", 1e-3, 1e7, unit=1e-6),
+        mass_sigma=table.number("mass_sigma_mg", 0.0, 1e6, unit=1e-6, default=0.0),
+    )
+    _check_density(table, projectile)
+    if projectile.mass_sigma >= projectile.mass:
+        raise table.wrong(
+            "mass_sigma_mg", f"{projectile.mass_sigma * 1e6:g} is not below mass_mg; check the unit"
+        )
+    if tip == "hemisphere" and 0.0 < projectile.length < projectile.tip_radius:
+        raise table.wrong(
+            "length_mm", f"{projectile.length * 1e3:g} is shorter than the tip's radius; give the whole rod"
+        )
+    return projectile
+
+
+def _read_bead(table: Table) -> Projectile:
+    table.choice("shape", ("sphere",))
+    bead = Projectile(
+        tip="sphere",
+        tip_radius=table.number("radius_mm", 0.05, 50.0, unit=1e-3),
+        mass=table.number("mass_mg", 1e-3, 1e7, unit=1e-6),
+    )
+    _check_density(table, bead)
+    return bead
+
+
+def _check_density(table: Table, projectile: Projectile) -> None:
+    """Mass and size must make a body that exists: this finds a unit off by a thousand in either."""
+    radius, length = projectile.tip_radius, projectile.length
+    volume = 4.0 / 3.0 * math.pi * radius**3
+    if projectile.tip == "hemisphere":
+        if length == 0.0:
+            return  # a rod of unknown length
+        volume = volume / 2.0 + math.pi * radius**2 * max(length - radius, 0.0)
+    density = projectile.mass / volume
+    if not LIGHTEST <= density <= HEAVIEST:
+        raise table.wrong(
+            "mass_mg",
+            f"{projectile.mass * 1e6:g} in this size is a density of {density:.3g} kg/m³, outside {LIGHTEST:g} to "
+            f"{HEAVIEST:g}; check the units of mass and radius",
+        )
+
+
+def _read_camera(table: Table) -> Camera:
+    return Camera(
+        frame_rate=table.number("frame_rate_Hz", 10.0, 1e7),
+        pixel_size=table.number("pixel_size_um", 0.1, 2000.0, unit=1e-6),
+        surface_row=table.number("surface_row_px", 0.0, 1e5),
+        surface_row_sigma=table.number("surface_row_sigma_px", 0.0, 100.0, default=0.0),
+    )
+
+
+def _read_published(table: Table, height_known: bool) -> Published:
+    published = Published(
+        penetration_depth=table.measured("penetration_depth_mm", 1e-4, 500.0, unit=1e-3, required=False),
+        stopping_time=table.measured("stopping_time_ms", 1e-3, 1e4, unit=1e-3, required=False),
+        impact_speed=table.measured("impact_speed_m_s", 1e-3, 100.0, required=not height_known),
+    )
+    if published.penetration_depth is None and published.stopping_time is None:
+        raise table.wrong(
+            "penetration_depth_mm", "and stopping_time_ms are both missing; give at least one of them"
+        )
+    return published
+
+
+def _read_source(document: Document) -> dict[str, Any]:
+    """[source]: free text, one key a figure, kept as written."""
+    table = document.table("source", required=False)
+    return {key: table.text(key) for key in table.values}
+
+
+def _existing(table: Table, folder: Path, *, folder_allowed: bool) -> Path:
+    path = folder / table.text("file")
+    if not (path.is_file() or (folder_allowed and path.is_dir())):
+        raise table.wrong("file", f"{path} is not there; name the record relative to {folder}")
+    if path.is_file() and path.stat().st_size == 0:
+        raise table.wrong("file", f"{path} is empty; put the record there")
+    if path.is_dir() and not any(path.iterdir()):
+        raise table.wrong("file", f"{path} is an empty folder; put the frames there")
+    return path
+
+
+def _toml_of(path: Path, name: str) -> Path:
+    if not path.exists():
+        raise CampaignError(path, "", f"no such file or folder; give a folder that holds {name}")
+    return path / name if path.is_dir() else path
+
+
+def _list_parts(folder: Path, name: str) -> list[Path]:
+    """Sub-folders in the order of their names; each must hold the TOML file."""
+    if not folder.is_dir():
+        return []
+    parts = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith((".", "__")))
+    for part in parts:
+        if not (part / name).is_file():
+            raise CampaignError(part, name, "is missing in this folder; add it or remove the folder")
+    return parts
+
+
+def _check_sequence(folder: Path, drops: tuple[Drop, ...]) -> None:
+    seen: dict[int, str] = {}
+    for drop in drops:
+        if drop.sequence and drop.sequence in seen:
+            raise CampaignError(
+                folder / "drops" / drop.name / "drop.toml",
+                "drop.sequence",
+                f"{drop.sequence} is also that of {seen[drop.sequence]}; number the drops in the order they were made",
+            )
+        seen[drop.sequence] = drop.name

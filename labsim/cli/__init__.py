@@ -1,0 +1,99 @@
+"""The command line: one file a command, no physics.
+
+To add a command, write ``labsim/cli/NAME.py`` with a function called NAME (typer annotations, see ``options`` for the
+options that all commands share). The folder is listed, so there is nothing else to edit; the file is imported only
+when its command is asked for. Report trouble by raising a LabsimError: ``main`` makes one ``error:`` line of it and
+leaves with status 2. Names that start with an underscore are not commands.
+"""
+
+from __future__ import annotations
+
+import importlib
+import keyword
+import pkgutil
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from ..errors import LabsimError
+
+NOT_COMMANDS = {"options"}
+
+
+def list_command_files() -> list[str]:
+    """Names of the modules in this folder that hold a command; ``new_`` would be the command ``new``."""
+    names = [info.name for info in pkgutil.iter_modules(__path__)]
+    return sorted(name for name in names if name not in NOT_COMMANDS and not name.startswith("_"))
+
+
+class CommandFolder(typer.core.TyperGroup):
+    """Finds commands by listing this folder and imports only the one that is asked for."""
+
+    def list_commands(self, ctx: object) -> list[str]:
+        return [name.rstrip("_").replace("_", "-") for name in list_command_files()]
+
+    def get_command(self, ctx: object, cmd_name: str):  # type: ignore[no-untyped-def]
+        module_name = cmd_name.replace("-", "_")
+        if keyword.iskeyword(module_name):
+            module_name += "_"
+        if module_name not in list_command_files():
+            return None
+        module = importlib.import_module(f"{__name__}.{module_name}")
+        single = typer.Typer(add_completion=False, rich_markup_mode=None)
+        single.command(name=cmd_name)(getattr(module, module_name))
+        return typer.main.get_command(single)
+
+
+app = typer.Typer(
+    cls=CommandFolder,
+    help="Laboratory drops into porous dust, linked to an SPH simulation: what does the simulation get wrong?",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"labsim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+# the base of all complaints about the command line itself; typer brings its own copy of click or uses the installed one
+_UsageTrouble = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command and leave: 0 done, 2 bad input (one line on standard error), 130 stopped by the user."""
+    try:
+        status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+    except LabsimError as trouble:
+        status = _complain(str(trouble), 2)
+    except _UsageTrouble as trouble:
+        if type(trouble).__name__ == "NoArgsIsHelpError":
+            typer.echo(trouble.format_message())
+            sys.exit(0)
+        context = getattr(trouble, "ctx", None)
+        path = context.command_path if context is not None else "labsim"
+        status = _complain(f"{path}: {trouble.format_message()}", 2)
+    except (KeyboardInterrupt, typer.Abort):
+        status = _complain("stopped; start the same command again to go on from the stored runs", 130)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _complain(text: str, status: int) -> int:
+    typer.echo("error: " + " ".join(text.split()), err=True)
+    return status

@@ -1,0 +1,150 @@
+"""Options that commands share, and the few things every command does at its end."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Protocol
+
+import typer
+
+from ..errors import LabsimError
+
+Out = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Output folder. Default: a new folder beside the input.")
+]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes that run simulations. Default: all cores.")
+]
+Scheduler = Annotated[str | None, typer.Option("--scheduler", help="Address of a running Dask scheduler.")]
+Store = Annotated[
+    Path | None,
+    typer.Option("--store", help="Folder of the stored runs. Default: LABSIM_STORE or the user's cache."),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary, only errors.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON on standard output.")]
+
+
+def make_output_folder(out: Path | None, source: Path, command: str) -> Path:
+    """Make the folder to write into and return it.
+
+    Without --out it is a new ``NAME-COMMAND`` beside the input (with a number where that is taken). Never inside a
+    campaign: what is written there would be read as data one day. Raises LabsimError.
+    """
+    source = source.resolve()
+    if source.is_file():
+        source = source.parent
+    campaign = next((p for p in (source, *source.parents) if (p / "campaign.toml").is_file()), source)
+    if out is None:
+        beside = campaign.with_name(f"{campaign.name}-{command}")
+        if source != campaign:
+            beside = campaign.with_name(f"{campaign.name}-{source.name}-{command}")
+        out, number = beside, 1
+        while out.exists() and any(out.iterdir()):
+            number += 1
+            out = beside.with_name(f"{beside.name}-{number}")
+    out = out.resolve()
+    if out == source or source in out.parents or out == campaign or campaign in out.parents:
+        raise LabsimError(out, "--out", f"lies inside the input {campaign}; name a folder outside it")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as trouble:
+        raise LabsimError(
+            out, "--out", f"cannot be made ({trouble.strerror}); name a folder you may write to"
+        ) from None
+    return out
+
+
+def write_json(path: Path, summary: dict[str, Any]) -> Path:
+    """Write a summary file; a number that is not finite becomes null, and a killed command leaves no half file."""
+    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    aside.write_text(json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    os.replace(aside, path)
+    return path
+
+
+def finish(summary: dict[str, Any], lines: str, *, as_json: bool, quiet: bool) -> None:
+    """Last words of a command: JSON where asked for, otherwise the lines a person reads."""
+    if as_json:
+        typer.echo(json.dumps(_finite(summary), ensure_ascii=False, allow_nan=False))
+    elif not quiet:
+        typer.echo(lines)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _finite(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+class Progress(Protocol):
+    """What long work calls: ``progress(done, total, text)``, as often as it likes."""
+
+    def __call__(self, done: int, total: int, text: str) -> None: ...
+
+
+@contextmanager
+def show_progress(quiet: bool) -> Iterator[Progress]:
+    """A bar with the time left on a terminal, a line every ten seconds elsewhere (standard error both)."""
+    if quiet:
+        yield lambda done, total, text: None
+    elif sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+        from rich.progress import Progress as Bars
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+            tasks: dict[str, Any] = {}
+
+            def report(done: int, total: int, text: str) -> None:
+                if text not in tasks:
+                    tasks[text] = bars.add_task(text, total=total)
+                bars.update(tasks[text], completed=done, total=total)
+
+            yield report
+    else:
+        yield _LineReport()
+
+
+class _LineReport:
+    """Progress for logs: a line when a stage begins, every ten seconds within it, and when it ends."""
+
+    def __init__(self) -> None:
+        self.text, self.began, self.last = "", 0.0, 0.0
+
+    def __call__(self, done: int, total: int, text: str) -> None:
+        now = time.monotonic()
+        if text != self.text:
+            self.text, self.began, self.last = text, now, -math.inf
+        if now - self.last < 10.0 and done < total:
+            return
+        self.last = now
+        left = f", about {(now - self.began) * (total - done) / done:.0f} s left" if 0 < done < total else ""
+        typer.echo(f"{text}: {done} of {total}{left}", err=True)
