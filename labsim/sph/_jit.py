@@ -1,0 +1,45 @@
+"""The one decorator of all compiled code, and a cache that cannot go stale.
+
+Numba checks only the file of the cached function, not the files it calls into, so an edit of one kernel could leave
+another one with old code inside. The cache folder is therefore named by a hash of all solver sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import platformdirs
+
+_SOURCES = Path(__file__).parent
+
+
+def hash_sources() -> str:
+    """Hash of every source of the solver and the version of the compiler: changes when a result could change."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(_SOURCES.rglob("*.py")):
+        digest.update(path.relative_to(_SOURCES).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+SOLVER_HASH = hash_sources()
+
+if "NUMBA_CACHE_DIR" not in os.environ:
+    numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("labsim")) / "compiled" / SOLVER_HASH)
+
+# not fastmath=True: "nnan" and "ninf" make NaN checks inside kernels return False in silence
+FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+def compiled(function: Callable) -> Callable:
+    """Compile a kernel: serial (one run a core), cached on disk, NaN kept visible."""
+    return numba.njit(cache=True, error_model="numpy", fastmath=FAST, boundscheck=False)(function)
+
+
+def solver_hash() -> str:
+    """Name of this solver: every stored run carries it, and a run of another solver is never reused."""
+    return SOLVER_HASH

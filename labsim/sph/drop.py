@@ -1,0 +1,249 @@
+"""One drop from first contact to a little after the stop: ``simulate(setting) -> DropRun``.
+
+Leapfrog: one evaluation of the forces a step, plastic state committed once a step. The compiled ``advance`` makes many
+steps; Python looks at the time step, at NaN and at the neighbour lists between them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..records import FloatArray
+from . import particles as rows
+from ._jit import compiled
+from .gradients import carry_stress, deform, mirror_axis, renormalise
+from .materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths, update_stress
+from .neighbours import Neighbours
+from .pairs import sum_forces, sum_gradients
+from .particles import place_particles
+from .projectile import interpolate, press
+from .run import DropRun, make_run
+from .setting import DropSetting, check_setting
+
+LOG = (
+    "time",
+    "depth",
+    "velocity",
+    "force",
+    "wall_impulse",
+    "external_impulse",
+    "heat",
+    "friction",
+    "contact",
+    "outside",
+)
+STEPS_AT_ONCE = 64
+
+# rows of particles.ROWS, as constants a compiled function can see
+(
+    X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
+    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ,
+) = range(len(rows.ROWS))  # fmt: skip
+
+
+@compiled
+def advance(
+    s, n, axisymmetric, source, wall, start, neighbour, origin, allowed, steps, log, first,
+    body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, contact_stiffness, friction,
+    side_friction, depth_knots, depth_force, speed_knots, speed_force,
+    solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor, rate_eta, rate_n, pore_gas,
+):  # fmt: skip
+    """Up to ``steps`` steps, or until a point has moved ``allowed`` from ``origin``. Returns how many were made.
+
+    body: tip height, speed, time, accumulated friction heat. Rows of ``s`` hold n particles and their mirror images.
+    """
+    x, z, u, w, area, ring = s[X], s[Z], s[U], s[W], s[AREA], s[RING]
+    images = source.size
+    contact = np.zeros(2)
+    for step in range(steps):
+        fastest = 0.0
+        for i in range(n):
+            if axisymmetric:
+                ring[i] = x[i]
+            area[i] = s[MASS, i] / (s[DENSITY, i] * ring[i])
+            fastest = max(fastest, s[SOUND, i])
+        dt = courant * h / fastest
+        if not (dt > 0.0):
+            return -1 - step
+        mirror_axis(n, images, source, x, -1.0)
+        mirror_axis(n, images, source, z, 1.0)
+        mirror_axis(n, images, source, u, -1.0)
+        mirror_axis(n, images, source, w, 1.0)
+        mirror_axis(n, images, source, area, 1.0)
+        sum_gradients(
+            n, x, z, u, w, area, start, neighbour, h, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ]
+        )
+        renormalise(n, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ])
+        # the velocities are those of the step that has just moved the particles, so is its length
+        update_stress(
+            n, body[4], axisymmetric, solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor,
+            rate_eta, rate_n, pore_gas, ring, u, s[LXX], s[LXZ], s[LZX], s[LZZ], s[DENSITY], s[ZERO_STRESS], s[INITIAL],
+            s[SXX], s[SZZ], s[SXZ], s[PRESSURE], s[SOUND], s[WORK], s[ELASTIC],
+        )  # fmt: skip
+        deform(n, body[4], s[LXX], s[LXZ], s[LZX], s[LZZ], s[DXX], s[DXZ], s[DZX], s[DZZ])
+        for i in range(n):
+            area[i] = s[MASS, i] / (s[DENSITY, i] * ring[i])
+            s[WEIGHT, i] = s[DENSITY, i] * ring[i]
+        carry_stress(
+            n,
+            ring,
+            s[PRESSURE],
+            s[SXX],
+            s[SZZ],
+            s[SXZ],
+            s[GXX],
+            s[GXZ],
+            s[GZZ],
+            s[MXX],
+            s[MXZ],
+            s[MZX],
+            s[MZZ],
+        )
+        if images > 0:
+            for k in (AREA, WEIGHT, SOUND, LXX, LZZ, MXX, MZZ):
+                mirror_axis(n, images, source, s[k], 1.0)
+            for k in (LXZ, LZX, MXZ, MZX):
+                mirror_axis(n, images, source, s[k], -1.0)
+        sum_forces(
+            n, x, z, u, w, area, s[WEIGHT], s[SOUND], s[LXX], s[LXZ], s[LZX], s[LZZ], s[MXX], s[MXZ], s[MZX], s[MZZ],
+            start, neighbour, h, alpha, beta, affine, s[FX], s[FZ], s[HEAT],
+        )  # fmt: skip
+        if axisymmetric:
+            for i in range(n):
+                s[FX, i] += area[i] * (s[SXX, i] + s[SZZ, i] + s[PRESSURE, i])
+        force = press(
+            n, is_rod, tip_radius, body[0], body[1], spacing, gap, contact_stiffness, friction,
+            x, z, u, w, s[MASS], s[SOUND], s[DXX], s[DXZ], s[DZX], s[DZZ], s[FX], s[FZ], contact,
+        )  # fmt: skip
+        depth = -body[0]
+        outside = 0.0
+        if side_friction > 0.0:
+            speed = -body[1]
+            outside += side_friction * max(depth, 0.0) * speed / (abs(speed) + 1.0e-3)
+        if depth_knots.size > 0:
+            outside += interpolate(depth, depth_knots, depth_force)
+        if speed_knots.size > 0:
+            speed = -body[1]
+            outside += interpolate(abs(speed), speed_knots, speed_force) * speed / (abs(speed) + 1.0e-3)
+        held = 0.0
+        free_mass = 0.0
+        heat = 0.0
+        moved = 0.0
+        for i in range(n):
+            heat += s[HEAT, i]
+            if wall[i]:
+                held -= s[FZ, i]
+                continue
+            free_mass += s[MASS, i]
+            u[i] += dt * s[FX, i] / s[MASS, i]
+            w[i] += dt * (s[FZ, i] / s[MASS, i] - gravity)
+            x[i] += dt * u[i]
+            z[i] += dt * w[i]
+            if axisymmetric and x[i] < 1.0e-3 * spacing:  # nothing passes the axis
+                x[i] = 1.0e-3 * spacing
+                u[i] = max(u[i], 0.0)
+            moved = max(moved, max(abs(x[i] - origin[0, i]), abs(z[i] - origin[1, i])))
+        row = log[first + step]
+        body[1] += dt * ((force + outside) / body_mass - gravity)
+        body[0] += dt * body[1]
+        body[2] += dt
+        body[3] += dt * contact[1]
+        body[4] = dt
+        last = log[first + step - 1]
+        row[0], row[1], row[2], row[3] = body[2], -body[0], -body[1], force + outside
+        row[4] = last[4] + dt * held
+        row[5] = last[5] + dt * (outside - gravity * (free_mass + body_mass))
+        row[6] = last[6] + dt * heat
+        row[7] = body[3]
+        row[8] = last[8] + dt * contact[0]
+        row[9] = last[9] - dt * outside * body[1]
+        if moved > allowed or body[1] >= 0.0 or not (abs(force) < 1.0e300):
+            return step + 1
+    return steps
+
+
+def simulate(setting: DropSetting, progress: Callable[[float], None] | None = None) -> DropRun:
+    """Run one drop; time zero is the first contact of the tip with the undisturbed surface.
+
+    progress is called now and then with the time reached, in s. Raises SimulationError (setting out of range, or the
+    run blew up: then the message names its parameters).
+    """
+    check_setting(setting)
+    began = time.perf_counter()
+    numerics, material, projectile = setting.numerics, setting.material, setting.projectile
+    axisymmetric = setting.geometry == "axisymmetric"
+    dust, wall = place_particles(setting)
+    n = dust.shape[1]
+    start_state = dust.copy()
+    h = numerics.smoothing * setting.spacing
+    skin = numerics.skin * h
+    neighbours = Neighbours(2 * h, skin)
+    state = np.zeros((dust.shape[0], n + 8))
+    state[:, :n] = dust
+    per_unit = 2 * math.pi if axisymmetric else 1.0
+    strength, tension = tabulate_strengths(material, setting.strength_shape)
+    force_scale = 1 / per_unit
+    depth_law = _split(setting.force_of_depth, force_scale)
+    speed_law = _split(setting.force_of_speed, force_scale)
+    body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
+    log = np.zeros((4096, 10))
+    log[0, 2] = setting.impact_speed
+    made, builds, stop_step, limit = 0, 0, None, setting.duration
+    while body[2] < limit:
+        source = (
+            np.nonzero(state[rows.X, :n] < 2 * h + 2 * skin)[0]
+            if axisymmetric
+            else np.zeros(0, dtype=np.int64)
+        )
+        if n + source.size > state.shape[1]:
+            state = np.concatenate([state[:, :n], np.zeros((state.shape[0], source.size + 64))], axis=1)
+        for row, sign in ((rows.X, -1.0), (rows.Z, 1.0)):
+            state[row, n : n + source.size] = sign * state[row, source]
+        neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
+        builds += 1
+        origin = state[[rows.X, rows.Z], :n].copy()
+        fresh = True
+        while fresh and body[2] < limit:
+            if made + STEPS_AT_ONCE + 2 > len(log):
+                log = np.concatenate([log, np.zeros_like(log)])
+            done = advance(
+                state, n, axisymmetric, source, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, STEPS_AT_ONCE,
+                log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
+                setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
+                numerics.contact_gap, numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
+                *depth_law, *speed_law, setting.monomer_density, strength, tension, (TABLE_SIZE - 1) / TABLE_TOP,
+                material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk, material.shear_factor,
+                setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
+            )  # fmt: skip
+            if done < 0 or not np.isfinite(body).all():
+                raise SimulationError(
+                    "simulation",
+                    "run",
+                    f"blew up after {made + max(done, 0)} steps at {body[2] * 1e3:.4g} ms with {setting}",
+                )
+            made += done
+            fresh = done == STEPS_AT_ONCE
+            if body[1] >= 0.0 and stop_step is None:
+                stop_step = made
+                limit = min(limit, body[2] * (1 + setting.after_stop))
+                at_stop = state[:, :n].copy()
+            if stop_step is not None:
+                fresh = fresh or (
+                    body[1] >= 0.0 and np.abs(state[[rows.X, rows.Z], :n] - origin).max() < 0.45 * skin
+                )
+        if progress is not None:
+            progress(float(body[2]))
+    return make_run(
+        setting, log[: made + 1], stop_step, at_stop if stop_step is not None else state[:, :n].copy(), state[:, :n],
+        start_state, wall, per_unit, builds, time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def _split(law: tuple[tuple[float, float], ...], scale: float) -> tuple[FloatArray, FloatArray]:
+    pairs = np.asarray(law, dtype=float).reshape(-1, 2)
+    return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1]) * scale

@@ -1,0 +1,62 @@
+"""The particles' state: one contiguous row a quantity, mirror images behind the particles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..records import FloatArray
+from .materials import porous_dust
+from .setting import DropSetting
+
+ROWS = (
+    "x z u w mass area ring weight sound density zero_stress initial sxx szz sxz pressure work elastic heat "
+    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz"
+).split()
+(
+    X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
+    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ,
+) = range(len(ROWS))  # fmt: skip
+
+WALL_LAYERS = 3  # of particles held still at the sides and the bottom
+
+
+def initial_filling_factor(setting: DropSetting, depth: FloatArray) -> FloatArray:
+    """φ0 at a depth (m, positive downwards) below the surface, with crust and gradient."""
+    crust = setting.crust_excess * np.exp(-depth / setting.crust_length) if setting.crust_excess else 0.0
+    return setting.filling_factor + crust + setting.filling_gradient * depth
+
+
+def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
+    """State (rows, n) of the dust at rest on a square lattice whose surface is z = 0, and which particles are walls.
+
+    The dust starts in hydrostatic balance (isotropic, within 0.8 Σ): φ0' is what carries the weight above.
+    """
+    spacing = setting.spacing
+    width, depth = setting.extent
+    axisymmetric = setting.geometry == "axisymmetric"
+    columns = (
+        np.arange(round(width / spacing))
+        if axisymmetric
+        else np.arange(round(width / spacing)) - round(width / spacing) // 2
+    )
+    x, z = np.meshgrid((columns + 0.5) * spacing, -(np.arange(round(depth / spacing)) + 0.5) * spacing)
+    x, z = x.ravel(), z.ravel()
+    state = np.zeros((len(ROWS), x.size))
+    state[X], state[Z] = x, z
+    phi = initial_filling_factor(setting, -z)
+    state[INITIAL] = phi
+    state[DENSITY] = phi * setting.monomer_density
+    state[RING] = x if axisymmetric else 1.0
+    state[MASS] = state[DENSITY] * state[RING] * spacing**2
+    state[AREA] = spacing**2
+    material = setting.material
+    weight_above = state[DENSITY] * setting.gravity * -z
+    pressure = np.minimum(weight_above, 0.8 * porous_dust.compressive_strength(phi, material))
+    stiffness = porous_dust.bulk_modulus(phi, material)
+    state[ZERO_STRESS] = phi / (1.0 + pressure / stiffness)
+    state[PRESSURE] = pressure
+    state[SOUND] = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / state[DENSITY])
+    state[DXX] = state[DZZ] = 1.0
+    edge = width if axisymmetric else width / 2
+    wall = (z < -depth + WALL_LAYERS * spacing) | (np.abs(x) > edge - WALL_LAYERS * spacing)
+    return state, wall

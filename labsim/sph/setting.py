@@ -1,0 +1,122 @@
+"""What is simulated: one drop, as plain data. A run is a pure function of this record and of the solver's sources."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from ..errors import SimulationError
+from ..records import Material, Projectile
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Choices of the discretisation; docs/numerics.md gives the measured effect of each on the depth."""
+
+    smoothing: float = 1.2  # smoothing length in spacings; the kernel ends at twice that
+    alpha: float = (
+        0.5  # artificial viscosity, acting only on what the particles' own velocity gradients leave of a jump
+    )
+    beta: float = 0.0  # its quadratic part
+    affine: float = 1.0  # share of the linear velocity field taken out of the jump; 0 is Monaghan's viscosity
+    courant: float = 0.6  # time step in smoothing lengths over the largest sound speed
+    contact_gap: float = (
+        0.42  # reach of the rigid surface in undeformed spacings, shrinking with the dust beside it
+    )
+    contact_stiffness: float = 0.3  # in units of mass (sound speed / spacing)^2
+    skin: float = 0.2  # of the neighbour list, in smoothing lengths
+
+
+@dataclass(frozen=True)
+class DropSetting:
+    """One drop. SI throughout; in the plane the projectile's mass is per metre of cylinder.
+
+    The lower block are the terms of the catalogue of effects; at their defaults each does nothing.
+    """
+
+    projectile: Projectile
+    impact_speed: float  # m/s, at first contact
+    material: Material
+    filling_factor: float = 0.15
+    monomer_density: float = 2000.0  # kg/m^3
+    gravity: float = 9.81  # m/s^2
+    geometry: Literal["planar", "axisymmetric"] = "axisymmetric"
+    spacing: float = 6.25e-5  # m
+    duration: float = 0.05  # s, the run ends here at the latest
+    after_stop: float = 0.2  # how long it goes on after the stop, in stopping times
+    width: float | None = None  # m, half width in r-z, full width in the plane; None: enough for this drop
+    depth: float | None = None  # m, of the dust; None: enough for this drop
+    numerics: Numerics = field(default_factory=Numerics)
+
+    strength_rate: float = 0.0  # s^n, Σ (1 + strength_rate ε̇^n)
+    strength_rate_exponent: float = 0.5
+    pore_gas: float = 0.0  # Pa
+    crust_excess: float = 0.0  # φ0 + crust_excess exp(-depth / crust_length)
+    crust_length: float = 3.0e-4  # m
+    filling_gradient: float = 0.0  # 1/m, growth of φ0 with depth
+    side_friction: float = 0.0  # N/m (planar: N/m per metre), times the immersed length
+    strength_shape: tuple[tuple[float, float], ...] = ()  # (φ, factor on Σ), linear between, constant beyond
+    force_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m, upward force N), linear between
+    force_of_speed: tuple[
+        tuple[float, float], ...
+    ] = ()  # (speed m/s, force N against the motion), linear between
+
+    def replace(self, **changes: object) -> DropSetting:
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Width (half width in r-z) and depth of the dust that is simulated, m, whole numbers of spacings."""
+        radius = self.projectile.tip_radius
+        planar = self.geometry == "planar"
+        area = 2 * radius if planar else math.pi * radius**2
+        expected = 7e-4 * self.projectile.mass * self.impact_speed / area
+        width = self.width if self.width is not None else (16 * radius if planar else 6 * radius)
+        depth = self.depth if self.depth is not None else max(6 * radius, 3 * radius + 1.5 * expected)
+        cells = 2 * round(width / self.spacing / 2) if planar else round(width / self.spacing)
+        return cells * self.spacing, round(depth / self.spacing) * self.spacing
+
+
+def check_setting(setting: DropSetting) -> None:
+    """Raise SimulationError, naming the value and what would do, where the solver's limits of validity end."""
+
+    def refuse(key: str, message: str) -> None:
+        raise SimulationError("simulation", key, message)
+
+    material, projectile = setting.material, setting.projectile
+    for key in ("impact_speed", "filling_factor", "monomer_density", "spacing", "duration"):
+        value = getattr(setting, key)
+        if not (math.isfinite(value) and value > 0):
+            refuse(key, f"is {value!r}; it must be a positive number")
+    if not (projectile.tip_radius > 0 and projectile.mass > 0):
+        refuse(
+            "projectile",
+            f"radius {projectile.tip_radius!r} m, mass {projectile.mass!r} kg; both must be positive",
+        )
+    if projectile.tip == "cylinder" and setting.geometry != "planar":
+        refuse(
+            "projectile.tip", "a lying cylinder is planar; choose hemisphere or sphere, or geometry planar"
+        )
+    if setting.spacing > projectile.tip_radius / 4 * 1.0000001:
+        refuse(
+            "spacing",
+            f"{setting.spacing:.3g} m does not resolve a tip of {projectile.tip_radius:.3g} m; "
+            f"use {projectile.tip_radius / 4:.3g} m or less",
+        )
+    low, high = material.phi_1, material.phi_2
+    reachable = [setting.filling_factor, setting.filling_factor + setting.crust_excess]
+    reachable.append(setting.filling_factor + setting.filling_gradient * setting.extent[1])
+    for phi in reachable:
+        if not low < phi < high:
+            refuse("filling_factor", f"{phi:.4g} lies outside ({low:.4g}, {high:.4g}), where Σ(φ) is defined")
+    if not material.p_m > 0:
+        refuse("material.p_m", f"is {material.p_m!r} Pa; it must be positive")
+    stiffness = material.bulk_modulus * (1 + 4 / 3 * material.shear_to_bulk)
+    sound = math.sqrt(stiffness / (setting.monomer_density * setting.filling_factor))
+    if setting.impact_speed >= sound:
+        refuse(
+            "impact_speed",
+            f"{setting.impact_speed:.3g} m/s is not below the sound speed {sound:.3g} m/s of this dust; "
+            "lower the speed or raise bulk_modulus",
+        )
