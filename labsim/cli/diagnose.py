@@ -1,0 +1,75 @@
+"""``labsim diagnose``: what the calibrated simulation gets wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..campaign import read_campaign
+from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
+from ..inference.runs import RunStore
+from ..inference.summary import calibrate_summary
+from . import options
+from .calibrate import (
+    BulkModulus,
+    Correction,
+    Use,
+    check_summary,
+    parse_correction,
+    parse_use,
+    write_calibration,
+)
+
+
+def diagnose(
+    campaign: Annotated[Path, typer.Argument(help="Campaign folder.")],
+    out: options.Out = None,
+    use: Use = "depth",
+    planar_correction: Correction = None,
+    bulk_modulus: BulkModulus = None,
+    workers: options.Workers = None,
+    scheduler: options.Scheduler = None,
+    store: options.Store = None,
+    seed: options.Seed = 1,
+    quiet: options.Quiet = False,
+    as_json: options.AsJson = False,
+) -> None:
+    """Calibrate, predict what was not calibrated, and say what the simulation gets wrong."""
+    read = read_campaign(campaign)
+    figures = parse_use(use)
+    check_summary(read)
+    folder = options.make_output_folder(out, campaign, "diagnose")
+    opened = RunStore(store)
+    with options.show_progress(quiet) as progress:
+        calibration = calibrate_summary(
+            read,
+            opened,
+            use=figures,
+            depth_reading=parse_correction(planar_correction),
+            bulk_modulus=bulk_modulus,
+            workers=workers,
+            scheduler=scheduler,
+            seed=seed,
+            progress=progress,
+        )
+        found = diagnose_summary(calibration, opened, workers=workers, scheduler=scheduler, progress=progress)
+    summary, lines = write_diagnosis(found, folder)
+    options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
+
+
+def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:
+    """Files of a calibration and its diagnosis; the summary and the lines for people."""
+    from ..report.figures import draw_compacted_volume, draw_density_field, draw_depth_law, draw_penetration
+    from ..report.tables import diagnosis_lines, diagnosis_summary
+
+    calibration = found.calibration
+    write_calibration(calibration, folder)
+    summary = diagnosis_summary(found)
+    options.write_json(folder / "diagnosis.json", summary)
+    draw_penetration(calibration, folder / "penetration.png")
+    draw_depth_law(found, folder / "depth_law.png")
+    draw_compacted_volume(found, folder / "compacted_volume.png")
+    draw_density_field(calibration.finest_run, folder / "density_field.png")
+    return summary, diagnosis_lines(found)

@@ -1,0 +1,1 @@
+"""What the simulation gets wrong: predictions against what was measured, causes, gain."""

@@ -1,0 +1,386 @@
+"""Stored runs: a simulation is a pure function of its setting and the solver, so it is done once.
+
+Input: drop settings (pure data). Output: the runs, in the same order, from the store where they are there and
+simulated where they are not. A run is one HDF5 file named by the hash of its setting and of the solver's sources,
+written aside and renamed: whatever is killed, a file that is there is whole. A lock per run (freed by the operating
+system when its process dies) keeps two processes from doing the same run. A run that blew up is stored as failed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import json
+import os
+import time
+import typing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import filelock
+import h5py
+import numpy as np
+import platformdirs
+
+from ..errors import InferenceError, LabsimError, SimulationError
+from ..sph import DropRun, DropSetting, simulate, solver_hash
+from .workers import open_executor
+
+FORMAT = 1  # of the stored files; part of the key
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class FailedRun:
+    """A run that blew up: kept, named with its parameters, and not tried again by the same solver."""
+
+    setting: DropSetting
+    message: str
+
+
+@dataclass(frozen=True)
+class Stored:
+    """One line of the index."""
+
+    key: str
+    solver: str
+    status: str  # "done" or "failed"
+    created: float  # s since 1970
+    wall: float  # s
+    bytes: int
+    label: str
+
+
+def default_store() -> Path:
+    """LABSIM_STORE, or ``runs`` in the user's cache folder."""
+    named = os.environ.get("LABSIM_STORE")
+    return Path(named) if named else Path(platformdirs.user_cache_dir("labsim")) / "runs"
+
+
+def canonical(setting: DropSetting) -> str:
+    """The setting as JSON in which equal settings are equal texts (every number as an exact hexadecimal float)."""
+    return json.dumps(_exact(dataclasses.asdict(setting)), sort_keys=True, separators=(",", ":"))
+
+
+def make_key(setting: DropSetting, solver: str | None = None) -> str:
+    """sha256 over the file format, the solver's sources and the setting."""
+    text = json.dumps([FORMAT, solver or solver_hash(), canonical(setting)])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class RunStore:
+    """A folder of runs. Any number of processes may use it at once.
+
+    ``new`` and ``reused`` count what ``get_many`` simulated and found since the store was opened.
+    """
+
+    def __init__(self, folder: Path | str | None = None) -> None:
+        self.folder = Path(folder) if folder is not None else default_store()
+        self.new = 0
+        self.reused = 0
+        try:
+            (self.folder / "locks").mkdir(parents=True, exist_ok=True)
+        except OSError as trouble:
+            raise InferenceError(
+                self.folder, "--store", f"cannot be made ({trouble.strerror}); name a folder you may write to"
+            ) from None
+
+    def path(self, key: str) -> Path:
+        return self.folder / key[:2] / f"{key}.h5"
+
+    def find(self, setting: DropSetting) -> DropRun | FailedRun | None:
+        """The stored run of this setting and this solver, or None (also where its file is damaged)."""
+        try:
+            return _read(self.path(make_key(setting)), setting)
+        except (OSError, KeyError, ValueError):
+            return None
+
+    def save(self, setting: DropSetting, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
+        """Write aside, flush to the disk, rename: there is never half a file under a run's name."""
+        key = make_key(setting)
+        path = self.path(key)
+        path.parent.mkdir(exist_ok=True)
+        aside = path.with_name(f".{key}.{os.getpid()}.part")
+        try:
+            _write(aside, key, setting, run, wall)
+            with aside.open("rb") as stream:
+                os.fsync(stream.fileno())
+            os.replace(aside, path)
+        finally:
+            aside.unlink(missing_ok=True)
+        return path
+
+    def get_many(
+        self,
+        settings: Sequence[DropSetting],
+        *,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        progress: Progress | None = None,
+        text: str = "simulating",
+    ) -> list[DropRun | FailedRun]:
+        """Runs of all settings, in their order; equal settings are run once, the longest first.
+
+        Raises InferenceError when a worker process dies; what was finished by then is stored.
+        """
+        report = progress or (lambda done, total, text: None)
+        by_key = {make_key(setting): setting for setting in settings}
+        results: dict[str, DropRun | FailedRun] = {}
+        for key, setting in by_key.items():
+            if (stored := self.find(setting)) is not None:
+                results[key] = stored
+        self.reused += len(results)
+        missing = sorted(set(by_key) - set(results), key=lambda key: -estimate_cost(by_key[key]))
+        if missing:
+            report(len(results), len(by_key), text)
+            with open_executor(workers, scheduler, len(missing)) as (executor, slots):
+                for key, run in self._run_missing(executor, slots, [(key, by_key[key]) for key in missing]):
+                    results[key] = run
+                    report(len(results), len(by_key), text)
+        return [results[make_key(setting)] for setting in settings]
+
+    def _run_missing(
+        self, executor: Executor, slots: int, todo: list[tuple[str, DropSetting]]
+    ) -> Iterator[tuple[str, DropRun | FailedRun]]:
+        running: dict[Future, tuple[str, DropSetting, filelock.BaseFileLock]] = {}
+        elsewhere: list[tuple[str, DropSetting]] = []
+        try:
+            while todo or running or elsewhere:
+                while todo and len(running) < slots:
+                    key, setting = todo.pop(0)
+                    lock = filelock.FileLock(self.folder / "locks" / key, timeout=0)
+                    try:
+                        lock.acquire()
+                    except filelock.Timeout:
+                        elsewhere.append((key, setting))  # another process is at it
+                        continue
+                    if (stored := self.find(setting)) is not None:  # finished elsewhere since we looked
+                        lock.release()
+                        self.reused += 1
+                        yield key, stored
+                        continue
+                    running[executor.submit(run_one, setting)] = (key, setting, lock)
+                if not running:
+                    todo, elsewhere = elsewhere, []
+                    if todo:
+                        time.sleep(0.2)
+                    continue
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    key, setting, lock = running.pop(future)
+                    try:
+                        run, wall = future.result()
+                        self.save(setting, run, wall)
+                    finally:
+                        lock.release()
+                    self.new += 1
+                    yield key, run
+        except BrokenProcessPool:
+            raise InferenceError(
+                self.folder,
+                "--workers",
+                "a worker process died (out of memory?); start again with fewer workers, finished runs are stored",
+            ) from None
+        finally:
+            for _key, _setting, lock in running.values():
+                lock.release()
+
+    def index(self) -> list[Stored]:
+        """All runs, newest first. ``index.json`` only saves reading every file and is made again whenever it is wrong."""
+        cache: dict[str, dict] = {}
+        path = self.folder / "index.json"
+        with contextlib.suppress(OSError, ValueError):
+            cache = json.loads(path.read_text())
+        entries: dict[str, Stored] = {}
+        for file in self.folder.glob("??/*.h5"):
+            known = cache.get(file.stem)
+            size = file.stat().st_size
+            if known is not None and known.get("bytes") == size:
+                entries[file.stem] = Stored(**known)
+            else:
+                with contextlib.suppress(OSError, KeyError, ValueError):
+                    entries[file.stem] = _read_label(file)
+        fresh = {key: dataclasses.asdict(entry) for key, entry in entries.items()}
+        if fresh != cache:
+            aside = self.folder / f".index.{os.getpid()}.part"
+            aside.write_text(json.dumps(fresh))
+            os.replace(aside, path)
+        return sorted(entries.values(), key=lambda entry: -entry.created)
+
+    def verify(self) -> list[tuple[Path, str]]:
+        """Read every file whole; return those that are damaged, with the reason."""
+        damaged = []
+        for file in sorted(self.folder.glob("??/*.h5")):
+            try:
+                with h5py.File(file, "r") as stored:
+                    text = json.dumps([FORMAT, stored.attrs["solver"], stored.attrs["setting_key"]])
+                    if (
+                        hashlib.sha256(text.encode()).hexdigest() != file.stem
+                        or stored.attrs["key"] != file.stem
+                    ):
+                        raise ValueError("its name is not the hash of its setting")
+                    stored.visititems(
+                        lambda name, item: item[()].size if isinstance(item, h5py.Dataset) else None
+                    )
+            except (OSError, KeyError, ValueError) as trouble:
+                damaged.append((file, str(trouble)))
+        return damaged
+
+    def prune(self, *, other_solvers: bool = True, failed: bool = False, everything: bool = False) -> int:
+        """Remove damaged files and left-overs, runs of other solvers, failed runs, or everything; return how many."""
+        doomed = {file for file, _reason in self.verify()}
+        for entry in self.index():
+            old = other_solvers and entry.solver != solver_hash()
+            if everything or old or (failed and entry.status == "failed"):
+                doomed.add(self.path(entry.key))
+        for part in self.folder.glob("??/.*.part"):
+            if time.time() - part.stat().st_mtime > 3600.0:
+                doomed.add(part)
+        for file in doomed:
+            file.unlink(missing_ok=True)
+        self.index()
+        return len(doomed)
+
+
+def run_one(setting: DropSetting) -> tuple[DropRun | FailedRun, float]:
+    """One run and its wall time; a run that blows up comes back as failed. This is what a worker does."""
+    began = time.perf_counter()
+    try:
+        run: DropRun | FailedRun = simulate(setting)
+    except SimulationError as trouble:
+        run = FailedRun(setting, str(trouble))
+    return run, time.perf_counter() - began
+
+
+def require_runs(runs: Sequence[DropRun | FailedRun]) -> list[DropRun]:
+    """The runs, or a SimulationError that names the first one that failed."""
+    for run in runs:
+        if isinstance(run, FailedRun):
+            raise SimulationError("", "", run.message)
+    return [run for run in runs if isinstance(run, DropRun)]
+
+
+def estimate_cost(setting: DropSetting) -> float:
+    """Relative cost of a run: particles times steps (the sound speed goes with the root of the bulk modulus)."""
+    width, depth = setting.extent
+    slowness = setting.material.p_m**-0.3 * setting.projectile.tip_radius  # the stopping time goes with it
+    return width * depth * slowness * setting.material.bulk_modulus**0.5 / setting.spacing**3
+
+
+def _exact(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _exact(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_exact(item) for item in value]
+    if isinstance(value, (bool, str)) or value is None:
+        return value
+    if isinstance(value, (int, float, np.floating, np.integer)):
+        return float(value).hex()
+    raise InferenceError(
+        "", "setting", f"{value!r} is not pure data; a setting holds numbers, texts and records only"
+    )
+
+
+def _write(path: Path, key: str, setting: DropSetting, run: DropRun | FailedRun, wall: float) -> None:
+    with h5py.File(path, "w") as stored:
+        stored.attrs.update(
+            format=FORMAT,
+            key=key,
+            solver=solver_hash(),
+            setting_key=canonical(setting),
+            setting=json.dumps(dataclasses.asdict(setting)),
+            status="failed" if isinstance(run, FailedRun) else "done",
+            created=time.time(),
+            wall=wall,
+            label=_label(setting),
+        )
+        if isinstance(run, FailedRun):
+            stored.attrs["message"] = run.message
+        else:
+            _pack(stored, run, skip={"setting"})
+
+
+def _read(path: Path, setting: DropSetting) -> DropRun | FailedRun | None:
+    if not path.is_file():
+        return None
+    with h5py.File(path, "r") as stored:
+        if stored.attrs["status"] == "failed":
+            return FailedRun(setting, str(stored.attrs["message"]))
+        return _unpack(stored, DropRun, given={"setting": setting})
+
+
+def _read_label(path: Path) -> Stored:
+    with h5py.File(path, "r") as stored:
+        a = stored.attrs
+        return Stored(
+            key=str(a["key"]),
+            solver=str(a["solver"]),
+            status=str(a["status"]),
+            created=float(a["created"]),
+            wall=float(a["wall"]),
+            bytes=path.stat().st_size,
+            label=str(a["label"]),
+        )
+
+
+def _label(setting: DropSetting) -> str:
+    material = setting.material
+    return (
+        f"{setting.geometry} {setting.projectile.tip} R {setting.projectile.tip_radius * 1e3:g} mm, "
+        f"{setting.impact_speed:.4g} m/s, p_m {material.p_m:.5g} Pa, K0 {material.bulk_modulus / 1e3:g} kPa, "
+        f"spacing {setting.spacing * 1e6:.4g} µm"
+    )
+
+
+def _pack(group: h5py.Group, record: Any, skip: set[str] = frozenset()) -> None:  # type: ignore[assignment]
+    """A dataclass of arrays, numbers, texts and further dataclasses into a group."""
+    for field in dataclasses.fields(record):
+        if field.name in skip:
+            continue
+        value = getattr(record, field.name)
+        if isinstance(value, np.ndarray):
+            options = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
+            group.create_dataset(field.name, data=value, **(options if value.ndim and value.size else {}))
+        elif dataclasses.is_dataclass(value):
+            _pack(group.create_group(field.name), value)
+        else:
+            group.attrs[field.name] = json.dumps(value, default=lambda item: item.item())
+
+
+def _unpack(group: h5py.Group, kind: type, given: dict[str, Any] | None = None) -> Any:
+    hints = typing.get_type_hints(kind)
+    values = dict(given or {})
+    for field in dataclasses.fields(kind):
+        if field.name in values:
+            continue
+        if field.name in group:
+            item = group[field.name]
+            if isinstance(item, h5py.Dataset):
+                values[field.name] = item[()]
+            else:
+                nested = [hints[field.name], *typing.get_args(hints[field.name])]
+                record = next(option for option in nested if dataclasses.is_dataclass(option))
+                values[field.name] = _unpack(item, record)  # type: ignore[arg-type]
+        else:
+            value = json.loads(group.attrs[field.name])
+            values[field.name] = tuple(value) if isinstance(value, list) else value
+    return kind(**values)
+
+
+__all__ = [
+    "DropRun",
+    "FailedRun",
+    "LabsimError",
+    "RunStore",
+    "Stored",
+    "canonical",
+    "default_store",
+    "estimate_cost",
+    "make_key",
+    "require_runs",
+    "run_one",
+]

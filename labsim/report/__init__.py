@@ -1,0 +1,1 @@
+"""Figures, tables and pages; nothing is computed here."""

@@ -1,0 +1,375 @@
+"""Figures of a calibration and a diagnosis from published figures. Records in, PNG files out.
+
+One look for all: ink and four colours that stay apart for colour-blind eyes and in grey, values in mm, ms and kPa.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import corner
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..diagnosis.summary import SummaryDiagnosis, compacted_area
+from ..inference.planar import expected_raw_depth, round_depth
+from ..inference.summary import SummaryCalibration, impact_speed
+from ..sph import DropRun
+
+INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
+STYLE = {
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": INK,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "figure.dpi": 110,
+    "savefig.dpi": 150,
+    "lines.linewidth": 1.6,
+}
+
+
+@contextmanager
+def new_figure(path: Path, width: float = 6.4, height: float = 4.4) -> Iterator[Figure]:
+    """A figure in labsim's look, written to ``path`` and closed."""
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(width, height), layout="constrained")
+        try:
+            yield figure
+            figure.savefig(path)
+        finally:
+            plt.close(figure)
+
+
+def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
+    """Raw penetration against time for five p_m, with the published depth and stopping time as target lines."""
+    drop = calibration.figures[0].drop
+    runs = list(calibration.runs[drop, calibration.bulk_modulus])
+    runs.append(calibration.runs["spacing", calibration.bulk_modulus][0])
+    runs.sort(key=lambda run: run.setting.material.p_m)
+    middle = int(
+        np.argmin([abs(np.log(run.setting.material.p_m / calibration.quantiles["q50"])) for run in runs])
+    )
+    first = min(max(middle - 2, 0), len(runs) - 5)
+    published = next(d.published for d in calibration.campaign.drops if d.name == drop)
+    assert published is not None
+    with new_figure(path) as figure:
+        axes = figure.add_subplot()
+        colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.88, 5))
+        for run, colour in zip(runs[first : first + 5], colours, strict=True):
+            upto = run.time <= 1.12 * run.stopping_time
+            axes.plot(
+                run.time[upto] * 1e3,
+                run.depth[upto] * 1e3,
+                color=colour,
+                label=f"{run.setting.material.p_m / 1e3:.2f} kPa",
+            )
+            axes.plot(run.stopping_time * 1e3, run.penetration_depth * 1e3, "o", color=colour, ms=5)
+        if published.penetration_depth is not None:
+            target = expected_raw_depth(published.penetration_depth.value, calibration.depth_reading) * 1e3
+            axes.axhline(target, color=INK, lw=1.0, ls="--")
+            axes.annotate(f" published depth, {target:.2f} mm", (0.0, target), va="bottom", color=INK)
+        if published.stopping_time is not None:
+            at = published.stopping_time
+            axes.axvspan(
+                (at.value - at.sigma) * 1e3, (at.value + at.sigma) * 1e3, color=GREY, alpha=0.25, lw=0
+            )
+            axes.axvline(at.value * 1e3, color=INK, lw=1.0, ls="--")
+            axes.annotate(
+                f"published stopping time, {at.value * 1e3:.1f} ms ",
+                (at.value * 1e3, axes.get_ylim()[1]),
+                rotation=90,
+                ha="right",
+                va="top",
+                color=INK,
+            )
+        axes.set(xlabel="time since contact (ms)", ylabel="raw planar depth (mm)", xlim=(0, None))
+        axes.invert_yaxis()
+        setting = runs[middle].setting
+        axes.set_title(
+            f"{2e3 * setting.projectile.tip_radius:g} mm cylinder at {setting.impact_speed:g} m/s, "
+            f"K0 {calibration.bulk_modulus / 1e3:g} kPa; dots: v = 0"
+        )
+        axes.legend(title="p_m", loc="lower left")
+    return path
+
+
+def draw_depth_law(diagnosis: SummaryDiagnosis, path: Path) -> Path:
+    """Depth against m v/A: the published law and the calibrated simulation for every size."""
+    calibration = diagnosis.calibration
+    rows = {row.name: row for row in diagnosis.drop_predictions if row.kind == "depth"}
+    with new_figure(path) as figure:
+        axes = figure.add_subplot()
+        top = 0.0
+        for radius, colour, marker in zip(
+            sorted(diagnosis.runs), (BLUE, ORANGE, GREEN, PURPLE), "osD^", strict=False
+        ):
+            drops = [
+                d for d in calibration.campaign.drops if d.name in rows and d.projectile.tip_radius == radius
+            ]
+            momentum = [
+                d.projectile.mass * impact_speed(d, calibration.campaign) / (np.pi * radius**2) for d in drops
+            ]
+            found = [rows[d.name] for d in drops]
+            axes.errorbar(
+                momentum,
+                [row.predicted * 1e3 for row in found],
+                [row.predicted_sigma * 1e3 for row in found],
+                fmt=marker,
+                color=colour,
+                capsize=2,
+                label=f"simulation, {2e3 * radius:g} mm",
+            )
+            top = max(top, *momentum)
+            coefficient = np.mean([row.observed / m for row, m in zip(found, momentum, strict=True)])
+            relative = np.mean([row.observed_sigma / row.observed for row in found])
+        line = np.array([0.0, 1.08 * top])
+        axes.plot(
+            line,
+            coefficient * line * 1e3,
+            color=INK,
+            label=f"published law, {coefficient * 1e4:.1f}e-4 m² s/kg · m v/A",
+        )
+        axes.fill_between(
+            line, (1 - relative) * coefficient * line * 1e3, (1 + relative) * coefficient * line * 1e3,
+            color=GREY, alpha=0.25, lw=0, label=f"its uncertainty, {relative:.0%}",
+        )  # fmt: skip
+        axes.axvline(1.0, color=GREY, lw=0.8, ls=":")
+        axes.annotate(" stated from here up", (1.0, 0.03), xycoords=("data", "axes fraction"), color=GREY)
+        axes.set(xlabel="m v/A (kg m⁻¹ s⁻¹)", ylabel="penetration depth (mm)", xlim=(0, None), ylim=(0, None))
+        factor = round_depth(1.0, calibration.depth_reading)
+        axes.set_title(f"simulated depth = {factor:.3f} x raw planar depth, p_m from {_used(calibration)}")
+        axes.legend(loc="upper left")
+    return path
+
+
+def draw_compacted_volume(diagnosis: SummaryDiagnosis, path: Path) -> Path:
+    """Volume compacted beyond a filling factor, with the published statement as a band."""
+    calibration = diagnosis.calibration
+    run = diagnosis.scan_run
+    scan = next(iter(calibration.campaign.published_scans), None)
+    with new_figure(path) as figure:
+        axes = figure.add_subplot()
+        if run is not None and scan is not None:
+            phi = np.linspace(0.13, 0.34, 200)
+            volume = [
+                run.compacted_volume(value) / (np.pi * run.setting.projectile.tip_radius**2) for value in phi
+            ]
+            axes.semilogy(phi, np.maximum(volume, 1e-3), color=BLUE, label="simulation")
+            low, high = scan.filling_factor_low, scan.filling_factor_high
+            axes.axvspan(low, high, color=GREY, alpha=0.18, lw=0)
+            observed = scan.sphere_volumes
+            axes.errorbar(
+                [(low + high) / 2], [observed.value], [observed.sigma], [(high - low) / 2],
+                fmt="s", color=INK, capsize=2, label=f"published: about one sphere volume at {low:g}-{high:g}",
+            )  # fmt: skip
+            inside = compacted_area(run, low, high)
+            axes.plot(
+                [(low + high) / 2],
+                [inside],
+                "o",
+                color=ORANGE,
+                label=f"simulation at {low:g}-{high:g}: {inside:.2f}",
+            )
+            axes.axvline(run.setting.filling_factor, color=GREEN, lw=1.0, ls="--")
+            axes.annotate(" undisturbed", (run.setting.filling_factor, 2e-3), color=GREEN)
+            axes.set(ylim=(1e-3, None))
+            axes.set_title(
+                f"{2e3 * run.setting.projectile.tip_radius:g} mm at {run.setting.impact_speed:g} m/s, "
+                f"p_m {run.setting.material.p_m / 1e3:.2f} kPa"
+            )
+        axes.set(
+            xlabel="volume filling factor φ",
+            ylabel="dust compacted beyond φ (cross-sections · sphere volumes)",
+        )
+        axes.set_ylabel("dust beyond φ (areas of the cylinder ≙ sphere volumes)")
+        axes.legend(loc="upper right")
+    return path
+
+
+def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Path:
+    """Filling factor of every particle at the end of a run, with the projectile's outline."""
+    setting = run.setting
+    radius = setting.projectile.tip_radius
+    dust = run.particles
+    across, z, phi = dust.r, dust.z, dust.filling_factor
+    if setting.geometry == "axisymmetric":
+        across, z, phi = np.concatenate([-across, across]), np.tile(z, 2), np.tile(phi, 2)
+    half = 4.5 * radius
+    deep = run.penetration_depth + 3.0 * radius
+    shown = (np.abs(across) < half) & (z > -deep)
+    with new_figure(path, 6.4, 4.8) as figure:
+        axes = figure.add_subplot()
+        points_per_metre = 72.0 * 4.9 / (2 * half)
+        size = (1.15 * setting.spacing * points_per_metre) ** 2
+        drawn = axes.scatter(
+            across[shown] * 1e3,
+            z[shown] * 1e3,
+            c=phi[shown],
+            s=size,
+            marker="s",
+            lw=0,
+            cmap="viridis",
+            vmin=0.12,
+            vmax=0.30,
+        )
+        centre = radius - run.penetration_depth
+        angle = np.linspace(0.0, 2 * np.pi, 181)
+        if setting.projectile.tip == "hemisphere":
+            angle = np.linspace(np.pi, 2 * np.pi, 91)
+        x, y = radius * np.cos(angle), centre + radius * np.sin(angle)
+        if setting.projectile.tip == "hemisphere":
+            top = max(2.0 * radius, centre + radius)
+            x, y = np.concatenate([[-radius], x, [radius]]), np.concatenate([[top], y, [top]])
+        axes.fill(x * 1e3, y * 1e3, facecolor="#DDDDDD", edgecolor=INK, lw=1.2)
+        axes.axhline(0.0, color=INK, lw=0.6, ls=":")
+        axes.set(aspect="equal", xlabel="mm", ylabel="height above the undisturbed surface (mm)")
+        axes.set_xlim(-half * 1e3, half * 1e3)
+        axes.set_ylim(-deep * 1e3, max(1.2 * radius, centre + 1.1 * radius) * 1e3)
+        figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
+        axes.set_title(
+            title
+            or f"{2e3 * radius:g} mm at {setting.impact_speed:g} m/s, p_m {setting.material.p_m / 1e3:.2f} kPa, "
+            f"at the stop, {run.stopping_time * 1e3:.1f} ms"
+        )
+    return path
+
+
+def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
+    """Posterior of p_m, and of the depth and stopping time that go with it, with the published values as lines."""
+    drop = calibration.figures[0].drop
+    emulator = calibration.emulators[drop, calibration.bulk_modulus]
+    outputs = emulator.predict(calibration.samples[:, None])
+    published = next(d.published for d in calibration.campaign.drops if d.name == drop)
+    assert published is not None
+    columns = [calibration.samples / 1e3, outputs[:, 0] * 1e3, outputs[:, 1] * 1e3]
+    truths: list[float | None] = [None, None, None]
+    if published.penetration_depth is not None:
+        truths[1] = expected_raw_depth(published.penetration_depth.value, calibration.depth_reading) * 1e3
+    if published.stopping_time is not None:
+        truths[2] = published.stopping_time.value * 1e3
+    data = np.column_stack(columns)
+    ranges = []
+    for column, truth in zip(data.T, truths, strict=True):
+        low, high = np.quantile(column, (0.002, 0.998))
+        if truth is not None:
+            low, high = min(low, truth), max(high, truth)
+        ranges.append((low - 0.05 * (high - low), high + 0.05 * (high - low)))
+    with plt.rc_context({**STYLE, "axes.spines.top": True, "axes.spines.right": True}):
+        figure = corner.corner(
+            data,
+            labels=["p_m (kPa)", f"raw depth of {drop} (mm)", f"T_s of {drop} (ms)"],
+            truths=truths,
+            truth_color=ORANGE,
+            color=BLUE,
+            range=ranges,
+            quantiles=(0.05, 0.5, 0.95),
+            show_titles=True,
+            title_fmt=".2f",
+            title_kwargs={"fontsize": 9},
+            plot_datapoints=False,
+        )
+        figure.text(
+            0.98, 0.98, f"p_m from {_used(calibration)}\norange: published", ha="right", va="top", color=INK
+        )
+        figure.savefig(path, bbox_inches="tight")
+        plt.close(figure)
+    return path
+
+
+def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
+    """Depth and stopping time against p_m (runs, emulator, targets), and p_m from every reading side by side."""
+    drop = calibration.figures[0].drop
+    published = next(d.published for d in calibration.campaign.drops if d.name == drop)
+    assert published is not None
+    moduli = sorted({k0 for name, k0 in calibration.emulators if name == drop}, reverse=True)
+    with new_figure(path, 10.5, 6.2) as figure:
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.25))
+        depth, stop = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
+        for k0, colour in zip(moduli, (BLUE, ORANGE, GREEN, PURPLE), strict=False):
+            emulator = calibration.emulators[drop, k0]
+            p_m = np.geomspace(float(emulator.low[0]), float(emulator.high[0]), 200)
+            outputs = emulator.predict(p_m[:, None])
+            runs = calibration.runs[drop, k0]
+            for axes, column, name in ((depth, 0, "penetration_depth"), (stop, 1, "stopping_time")):
+                axes.loglog(p_m / 1e3, outputs[:, column] * 1e3, color=colour, label=f"K0 {k0 / 1e3:g} kPa")
+                axes.plot(
+                    [run.setting.material.p_m / 1e3 for run in runs],
+                    [getattr(run, name) * 1e3 for run in runs], "o", ms=4, color=colour,
+                )  # fmt: skip
+        if published.penetration_depth is not None:
+            for reading, style in (("multiply_exp", "-"), ("none", "--"), ("multiply_sim", ":")):
+                target = expected_raw_depth(published.penetration_depth.value, reading) * 1e3
+                depth.axhline(target, color=INK, lw=1.0, ls=style, label=f"{target:.2f} mm, {reading}")
+        if published.stopping_time is not None:
+            at = published.stopping_time
+            stop.axhspan(
+                (at.value - at.sigma) * 1e3, (at.value + at.sigma) * 1e3, color=GREY, alpha=0.3, lw=0
+            )
+            stop.axhline(at.value * 1e3, color=INK, lw=1.0, label=f"{at.value * 1e3:.1f} ms, published")
+        for axes, label in ((depth, "raw depth (mm)"), (stop, "stopping time (ms)")):
+            axes.set(xlabel="p_m (kPa)", ylabel=label)
+            axes.xaxis.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+            low, high = axes.get_ylim()
+            ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10) if low <= t <= high]
+            axes.set_yticks(ticks, [f"{t:g}" for t in ticks])
+            axes.legend(fontsize=7.5)
+        forest = figure.add_subplot(grid[:, 1])
+        rows = sorted(calibration.readings, key=lambda r: (-r.bulk_modulus, len(r.use), r.use, r.q50))
+        for place, row in enumerate(rows):
+            own = (row.bulk_modulus, row.use) == (calibration.bulk_modulus, calibration.use) and (
+                "depth" not in row.use or row.depth_reading == calibration.depth_reading
+            )
+            colour = ORANGE if own else GREY if row.misfit > 6.63 else BLUE
+            forest.plot([row.q05 / 1e3, row.q95 / 1e3], [place, place], color=colour, lw=2.2)
+            forest.plot(row.q50 / 1e3, place, "o", color=colour, ms=5)
+        forest.set_yticks(range(len(rows)), [row.name for row in rows], fontsize=8)
+        forest.invert_yaxis()
+        forest.set_xscale("log")
+        ticks = [t for t in (0.2, 0.3, 0.5, 1, 2, 3, 5) if forest.get_xlim()[0] <= t <= forest.get_xlim()[1]]
+        forest.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        forest.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+        forest.set(xlabel="p_m (kPa), median and 90 %")
+        forest.set_title("orange: this calibration; grey: no p_m fits both (χ² > 6.6)")
+        depth.set_title(f"{drop}: emulator (lines) and its runs (dots)")
+    return path
+
+
+def draw_run(run: DropRun, path: Path) -> Path:
+    """Depth, velocity and force of one run, and where the dust went."""
+    with new_figure(path, 7.2, 6.4) as figure:
+        panels = figure.subplots(3, 1, sharex=True)
+        planar = run.setting.geometry == "planar"
+        for axes, values, label in zip(
+            panels,
+            (run.depth * 1e3, run.velocity, run.force),
+            ("depth (mm)", "velocity (m/s)", "force (N/m)" if planar else "force (N)"),
+            strict=True,
+        ):
+            axes.plot(run.time * 1e3, values, color=BLUE)
+            axes.set_ylabel(label)
+            axes.axvline(run.stopping_time * 1e3, color=INK, lw=0.8, ls="--")
+        panels[0].invert_yaxis()
+        panels[1].axhline(0.0, color=GREY, lw=0.6)
+        panels[2].set_xlabel("time since contact (ms)")
+        setting = run.setting
+        panels[0].set_title(
+            f"{setting.projectile.tip} R {setting.projectile.tip_radius * 1e3:g} mm at {setting.impact_speed:g} m/s, "
+            f"p_m {setting.material.p_m / 1e3:.3g} kPa: depth {run.penetration_depth * 1e3:.3f} mm, "
+            f"T_s {run.stopping_time * 1e3:.2f} ms"
+        )
+    return path
+
+
+def _used(calibration: SummaryCalibration) -> str:
+    return " and ".join(kind.replace("_", " ") for kind in calibration.use)
