@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -136,8 +137,11 @@ def advance(
         moved = 0.0
         for i in range(n):
             heat += s[HEAT, i]
-            if wall[i]:
+            if wall[i]:  # keeps its velocity, nought in a drop
                 held -= s[FZ, i]
+                x[i] += dt * u[i]
+                z[i] += dt * w[i]
+                moved = max(moved, max(abs(x[i] - origin[0, i]), abs(z[i] - origin[1, i])))
                 continue
             free_mass += s[MASS, i]
             u[i] += dt * s[FX, i] / s[MASS, i]
@@ -167,32 +171,46 @@ def advance(
     return steps
 
 
-def simulate(setting: DropSetting, progress: Callable[[float], None] | None = None) -> DropRun:
-    """Run one drop; time zero is the first contact of the tip with the undisturbed surface.
+@dataclass
+class Evolution:
+    """What ``evolve`` made: state (rows, n) at the end and at the stop, one row of LOG a step, numbers of the run."""
 
-    progress is called now and then with the time reached, in s. Raises SimulationError (setting out of range, or the
-    run blew up: then the message names its parameters).
+    state: FloatArray
+    at_stop: FloatArray
+    log: FloatArray
+    stop_step: int | None
+    rebuilds: int
+
+
+def evolve(
+    setting: DropSetting,
+    dust: FloatArray,
+    wall: np.ndarray,
+    body: FloatArray,
+    watch: Callable[[float, FloatArray], None] | None = None,
+    steps_at_once: int = STEPS_AT_ONCE,
+) -> Evolution:
+    """Move particles of any initial state (rows of ``particles.ROWS``, n) until ``setting.duration``, or past the stop.
+
+    wall particles keep the velocity they have. body: height (m) and velocity (m/s, upwards) of the projectile's tip,
+    then time and two zeros; far above the dust it is as good as absent. watch is called with time and state between
+    compiled stretches of at most ``steps_at_once`` steps. Raises SimulationError if the run blows up.
     """
-    check_setting(setting)
-    began = time.perf_counter()
     numerics, material, projectile = setting.numerics, setting.material, setting.projectile
     axisymmetric = setting.geometry == "axisymmetric"
-    dust, wall = place_particles(setting)
     n = dust.shape[1]
-    start_state = dust.copy()
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
     neighbours = Neighbours(2 * h, skin)
     state = np.zeros((dust.shape[0], n + 8))
     state[:, :n] = dust
     per_unit = 2 * math.pi if axisymmetric else 1.0
-    strength, tension = tabulate_strengths(material, setting.strength_shape)
     force_scale = 1 / per_unit
+    strength, tension = tabulate_strengths(material, setting.strength_shape)
     depth_law = _split(setting.force_of_depth, force_scale)
     speed_law = _split(setting.force_of_speed, force_scale)
-    body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
-    log = np.zeros((4096, 10))
-    log[0, 2] = setting.impact_speed
+    log = np.zeros((4096, len(LOG)))
+    log[0, 1], log[0, 2] = -body[0], -body[1]
     made, builds, stop_step, limit = 0, 0, None, setting.duration
     while body[2] < limit:
         source = (
@@ -209,10 +227,10 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
         origin = state[[rows.X, rows.Z], :n].copy()
         fresh = True
         while fresh and body[2] < limit:
-            if made + STEPS_AT_ONCE + 2 > len(log):
+            if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
             done = advance(
-                state, n, axisymmetric, source, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, STEPS_AT_ONCE,
+                state, n, axisymmetric, source, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps_at_once,
                 log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
                 numerics.contact_gap, numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
@@ -227,7 +245,7 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
                     f"blew up after {made + max(done, 0)} steps at {body[2] * 1e3:.4g} ms with {setting}",
                 )
             made += done
-            fresh = done == STEPS_AT_ONCE
+            fresh = done == steps_at_once
             if body[1] >= 0.0 and stop_step is None:
                 stop_step = made
                 limit = min(limit, body[2] * (1 + setting.after_stop))
@@ -236,11 +254,33 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
                 fresh = fresh or (
                     body[1] >= 0.0 and np.abs(state[[rows.X, rows.Z], :n] - origin).max() < 0.45 * skin
                 )
-        if progress is not None:
-            progress(float(body[2]))
+            if watch is not None:
+                watch(float(body[2]), state[:, :n])
+    return Evolution(
+        state[:, :n],
+        at_stop if stop_step is not None else state[:, :n].copy(),
+        log[: made + 1],
+        stop_step,
+        builds,
+    )
+
+
+def simulate(setting: DropSetting, progress: Callable[[float], None] | None = None) -> DropRun:
+    """Run one drop; time zero is the first contact of the tip with the undisturbed surface.
+
+    progress is called now and then with the time reached, in s. Raises SimulationError (setting out of range, or the
+    run blew up: then the message names its parameters).
+    """
+    check_setting(setting)
+    began = time.perf_counter()
+    dust, wall = place_particles(setting)
+    body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
+    watch = None if progress is None else lambda reached, state: progress(reached)
+    result = evolve(setting, dust, wall, body, watch)
+    per_unit = 2 * math.pi if setting.geometry == "axisymmetric" else 1.0
     return make_run(
-        setting, log[: made + 1], stop_step, at_stop if stop_step is not None else state[:, :n].copy(), state[:, :n],
-        start_state, wall, per_unit, builds, time.perf_counter() - began,
+        setting, result.log, result.stop_step, result.at_stop, result.state,
+        dust, wall, per_unit, result.rebuilds, time.perf_counter() - began,
     )  # fmt: skip
 
 
