@@ -49,7 +49,7 @@ STEPS_AT_ONCE = 64
 
 @compiled
 def advance(
-    s, n, axisymmetric, source, wall, start, neighbour, origin, allowed, steps, log, first,
+    s, n, axisymmetric, source, twice_plane, wall, start, neighbour, origin, allowed, steps, log, first,
     body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, contact_stiffness, friction,
     side_friction, depth_knots, depth_force, speed_knots, speed_force,
     solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor, rate_eta, rate_n, pore_gas,
@@ -71,7 +71,8 @@ def advance(
         dt = courant * h / fastest
         if not (dt > 0.0):
             return -1 - step
-        mirror_axis(n, images, source, x, -1.0)
+        for k in range(images):
+            x[n + k] = twice_plane[k] - x[source[k]]
         mirror_axis(n, images, source, z, 1.0)
         mirror_axis(n, images, source, u, -1.0)
         mirror_axis(n, images, source, w, 1.0)
@@ -110,6 +111,14 @@ def advance(
                 mirror_axis(n, images, source, s[k], 1.0)
             for k in (LXZ, LZX, MXZ, MZX):
                 mirror_axis(n, images, source, s[k], -1.0)
+            if axisymmetric:
+                for k in range(images):
+                    ratio = abs(x[n + k]) / x[source[k]]  # of ring radii; 1 on the axis
+                    s[WEIGHT, n + k] *= ratio
+                    s[MXX, n + k] *= ratio
+                    s[MXZ, n + k] *= ratio
+                    s[MZX, n + k] *= ratio
+                    s[MZZ, n + k] *= ratio
         sum_forces(
             n, x, z, u, w, area, s[WEIGHT], s[SOUND], s[LXX], s[LXZ], s[LZX], s[LZZ], s[MXX], s[MXZ], s[MZX], s[MZZ],
             start, neighbour, h, alpha, beta, affine, s[FX], s[FZ], s[HEAT],
@@ -189,16 +198,19 @@ def evolve(
     body: FloatArray,
     watch: Callable[[float, FloatArray], None] | None = None,
     steps_at_once: int = STEPS_AT_ONCE,
+    planes: tuple[float, ...] = (),
 ) -> Evolution:
     """Move particles of any initial state (rows of ``particles.ROWS``, n) until ``setting.duration``, or past the stop.
 
     wall particles keep the velocity they have. body: height (m) and velocity (m/s, upwards) of the projectile's tip,
     then time and two zeros; far above the dust it is as good as absent. watch is called with time and state between
-    compiled stretches of at most ``steps_at_once`` steps. Raises SimulationError if the run blows up.
+    compiled stretches of at most ``steps_at_once`` steps. planes: x (m) of mirrors besides the axis, walls of free slip
+    with all dust on one side; their distance must exceed the reach of the kernel. Raises SimulationError if the run blows up.
     """
     numerics, material, projectile = setting.numerics, setting.material, setting.projectile
     axisymmetric = setting.geometry == "axisymmetric"
     n = dust.shape[1]
+    mirrors = (0.0, *planes) if axisymmetric else planes
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
     neighbours = Neighbours(2 * h, skin)
@@ -213,15 +225,11 @@ def evolve(
     log[0, 1], log[0, 2] = -body[0], -body[1]
     made, builds, stop_step, limit = 0, 0, None, setting.duration
     while body[2] < limit:
-        source = (
-            np.nonzero(state[rows.X, :n] < 2 * h + 2 * skin)[0]
-            if axisymmetric
-            else np.zeros(0, dtype=np.int64)
-        )
+        source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
         if n + source.size > state.shape[1]:
             state = np.concatenate([state[:, :n], np.zeros((state.shape[0], source.size + 64))], axis=1)
-        for row, sign in ((rows.X, -1.0), (rows.Z, 1.0)):
-            state[row, n : n + source.size] = sign * state[row, source]
+        state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
+        state[rows.Z, n : n + source.size] = state[rows.Z, source]
         neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
         builds += 1
         origin = state[[rows.X, rows.Z], :n].copy()
@@ -230,7 +238,7 @@ def evolve(
             if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
             done = advance(
-                state, n, axisymmetric, source, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps_at_once,
+                state, n, axisymmetric, source, twice_plane, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps_at_once,
                 log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
                 numerics.contact_gap, numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
@@ -282,6 +290,14 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
         setting, result.log, result.stop_step, result.at_stop, result.state,
         dust, wall, per_unit, result.rebuilds, time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _find_images(x: FloatArray, near: float, mirrors: tuple[float, ...]) -> tuple[np.ndarray, FloatArray]:
+    """Which particles have an image behind a mirror at x = const, and twice the place of its mirror."""
+    sources = [np.nonzero(np.abs(x - at) < near)[0] for at in mirrors] or [np.zeros(0, dtype=np.int64)]
+    return np.concatenate(sources), np.repeat(
+        2.0 * np.asarray(mirrors), [len(found) for found in sources][: len(mirrors)]
+    )
 
 
 def _split(law: tuple[tuple[float, float], ...], scale: float) -> tuple[FloatArray, FloatArray]:
