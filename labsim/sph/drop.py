@@ -22,7 +22,7 @@ from .materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths, up
 from .neighbours import Neighbours
 from .pairs import sum_forces, sum_gradients
 from .particles import place_particles
-from .projectile import interpolate, press
+from .projectile import interpolate, measure_surface, press, solve_wall_weight, weigh_wall_layer
 from .run import DropRun, make_run
 from .setting import DropSetting, check_setting
 
@@ -43,14 +43,15 @@ STEPS_AT_ONCE = 64
 # rows of particles.ROWS, as constants a compiled function can see
 (
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
-    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ,
+    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, GZX,
+    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY,
 ) = range(len(rows.ROWS))  # fmt: skip
 
 
 @compiled
 def advance(
     s, n, axisymmetric, source, twice_plane, wall, start, neighbour, origin, allowed, steps, log, first,
-    body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, contact_stiffness, friction,
+    body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, wall_weight, contact_stiffness, friction,
     side_friction, depth_knots, depth_force, speed_knots, speed_force,
     solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor, rate_eta, rate_n, pore_gas,
 ):  # fmt: skip
@@ -80,7 +81,7 @@ def advance(
         sum_gradients(
             n, x, z, u, w, area, start, neighbour, h, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ]
         )
-        renormalise(n, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ])
+        renormalise(n, s[GXX], s[GXZ], s[GZX], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ])
         # the velocities are those of the step that has just moved the particles, so is its length
         update_stress(
             n, body[4], axisymmetric, solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor,
@@ -91,21 +92,18 @@ def advance(
         for i in range(n):
             area[i] = s[MASS, i] / (s[DENSITY, i] * ring[i])
             s[WEIGHT, i] = s[DENSITY, i] * ring[i]
+        measure_surface(
+            n, is_rod, tip_radius, body[0], spacing, x, z, s[DXX], s[DXZ], s[DZX], s[DZZ],
+            s[DISTANCE], s[NX], s[NZ], s[THICKNESS],
+        )  # fmt: skip
+        weigh_wall_layer(
+            n, body[4], spacing, wall_weight, s[DISTANCE], s[NX], s[NZ], s[THICKNESS], s[GXX], s[GXZ], s[GZX], s[GZZ],
+            s[LXX], s[LXZ], s[LZX], s[LZZ], s[SXX], s[SZZ], s[SXZ], s[PRESSURE], s[DENSITY], s[WORK],
+        )  # fmt: skip
         carry_stress(
-            n,
-            ring,
-            s[PRESSURE],
-            s[SXX],
-            s[SZZ],
-            s[SXZ],
-            s[GXX],
-            s[GXZ],
-            s[GZZ],
-            s[MXX],
-            s[MXZ],
-            s[MZX],
-            s[MZZ],
-        )
+            n, ring, s[PRESSURE], s[SXX], s[SZZ], s[SXZ], s[GXX], s[GXZ], s[GZX], s[GZZ],
+            s[MXX], s[MXZ], s[MZX], s[MZZ],
+        )  # fmt: skip
         if images > 0:
             for k in (AREA, WEIGHT, SOUND, LXX, LZZ, MXX, MZZ):
                 mirror_axis(n, images, source, s[k], 1.0)
@@ -127,8 +125,8 @@ def advance(
             for i in range(n):
                 s[FX, i] += area[i] * (s[SXX, i] + s[SZZ, i] + s[PRESSURE, i])
         force = press(
-            n, is_rod, tip_radius, body[0], body[1], spacing, gap, contact_stiffness, friction,
-            x, z, u, w, s[MASS], s[SOUND], s[DXX], s[DXZ], s[DZX], s[DZZ], s[FX], s[FZ], contact,
+            n, body[1], spacing, gap, contact_stiffness, friction, s[DISTANCE], s[NX], s[NZ], s[THICKNESS],
+            s[REST_DENSITY], u, w, s[MASS], s[DENSITY], s[SOUND], s[FX], s[FZ], contact,
         )  # fmt: skip
         depth = -body[0]
         outside = 0.0
@@ -241,7 +239,7 @@ def evolve(
                 state, n, axisymmetric, source, twice_plane, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps_at_once,
                 log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
-                numerics.contact_gap, numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
+                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
                 *depth_law, *speed_law, setting.monomer_density, strength, tension, (TABLE_SIZE - 1) / TABLE_TOP,
                 material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk, material.shear_factor,
                 setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,

@@ -22,7 +22,7 @@ def mirror_axis(n, count, source, row, sign):
 
 
 @compiled
-def renormalise(n, gxx, gxz, gzz, lxx, lxz, lzx, lzz):
+def renormalise(n, gxx, gxz, gzx, gzz, lxx, lxz, lzx, lzz):
     """Invert the moment matrices in place (g becomes B) and apply them to the raw velocity gradients."""
     for i in range(n):
         a, b, c = gxx[i], gxz[i], gzz[i]
@@ -33,7 +33,7 @@ def renormalise(n, gxx, gxz, gzz, lxx, lxz, lzx, lzz):
             c += lift
         scale = 1.0 / (a * c - b * b)
         ia, ib, ic = c * scale, -b * scale, a * scale
-        gxx[i], gxz[i], gzz[i] = ia, ib, ic
+        gxx[i], gxz[i], gzx[i], gzz[i] = ia, ib, ib, ic
         x0, x1, y0, y1 = lxx[i], lxz[i], lzx[i], lzz[i]
         lxx[i] = x0 * ia + x1 * ib
         lxz[i] = x0 * ib + x1 * ic
@@ -42,15 +42,15 @@ def renormalise(n, gxx, gxz, gzz, lxx, lxz, lzx, lzz):
 
 
 @compiled
-def carry_stress(n, ring, pressure, sxx, szz, sxz, bxx, bxz, bzz, mxx, mxz, mzx, mzz):
+def carry_stress(n, ring, pressure, sxx, szz, sxz, bxx, bxz, bzx, bzz, mxx, mxz, mzx, mzz):
     """M = ring radius · stress · B, what each particle brings into the sum of forces."""
     for i in range(n):
         a = (sxx[i] - pressure[i]) * ring[i]
         c = (szz[i] - pressure[i]) * ring[i]
         b = sxz[i] * ring[i]
-        mxx[i] = a * bxx[i] + b * bxz[i]
+        mxx[i] = a * bxx[i] + b * bzx[i]
         mxz[i] = a * bxz[i] + b * bzz[i]
-        mzx[i] = b * bxx[i] + c * bxz[i]
+        mzx[i] = b * bxx[i] + c * bzx[i]
         mzz[i] = b * bxz[i] + c * bzz[i]
 
 

@@ -10,11 +10,12 @@ from .setting import DropSetting
 
 ROWS = (
     "x z u w mass area ring weight sound density zero_stress initial sxx szz sxz pressure work elastic heat "
-    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz"
+    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz gzx distance nx nz thickness rest_density"
 ).split()
 (
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
-    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ,
+    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, GZX,
+    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY,
 ) = range(len(ROWS))  # fmt: skip
 
 WALL_LAYERS = 3  # of particles held still at the sides and the bottom
@@ -56,7 +57,8 @@ def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     state[ZERO_STRESS] = phi / (1.0 + pressure / stiffness)
     state[PRESSURE] = pressure
     state[SOUND] = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / state[DENSITY])
-    state[DXX] = state[DZZ] = 1.0
+    state[DXX] = state[DZZ] = state[THICKNESS] = 1.0
+    state[REST_DENSITY] = state[DENSITY]
     edge = width if axisymmetric else width / 2
     wall = (z < -depth + WALL_LAYERS * spacing) | (np.abs(x) > edge - WALL_LAYERS * spacing)
     return state, wall

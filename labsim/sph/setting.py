@@ -15,15 +15,11 @@ class Numerics:
     """Choices of the discretisation; docs/numerics.md gives the measured effect of each on the depth."""
 
     smoothing: float = 1.2  # smoothing length in spacings; the kernel ends at twice that
-    alpha: float = (
-        0.5  # artificial viscosity, acting only on what the particles' own velocity gradients leave of a jump
-    )
+    alpha: float = 0.5  # artificial viscosity, on what two particles' own velocity gradients leave of a jump
     beta: float = 0.0  # its quadratic part
     affine: float = 1.0  # share of the linear velocity field taken out of the jump; 0 is Monaghan's viscosity
     courant: float = 0.6  # time step in smoothing lengths over the largest sound speed
-    contact_gap: float = (
-        0.42  # reach of the rigid surface in undeformed spacings, shrinking with the dust beside it
-    )
+    contact_gap: float = 0.5  # reach of the rigid surface in spacings, shrinking with the dust beside it
     contact_stiffness: float = 0.3  # in units of mass (sound speed / spacing)^2
     skin: float = 0.2  # of the neighbour list, in smoothing lengths
 
