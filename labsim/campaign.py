@@ -31,6 +31,19 @@ from .tables import Document, Table
 SLICE_SUFFIXES = {".tif", ".tiff", ".png", ".bmp"}
 # densities between which a projectile is believed, kg/m^3: a hollow tube up to osmium
 LIGHTEST, HEAVIEST = 20.0, 23000.0
+# key in [material] -> field of Material, and between what it is believed; all but p_m
+MATERIAL_KEYS = {
+    "phi_1": ("phi_1", 0.0, 0.74),
+    "phi_2": ("phi_2", 0.01, 1.0),
+    "delta": ("delta", 0.01, 5.0),
+    "tensile_log10_a": ("tensile_log10_a", -5.0, 9.0),
+    "tensile_log10_b": ("tensile_log10_b", -20.0, 20.0),
+    "shear_factor": ("shear_factor", 0.0, 100.0),
+    "bulk_modulus_Pa": ("bulk_modulus", 100.0, 1e9),
+    "bulk_exponent": ("bulk_exponent", 0.0, 15.0),
+    "shear_to_bulk": ("shear_to_bulk", 1e-3, 1.5),
+    "contact_friction": ("contact_friction", 0.0, 5.0),
+}
 
 
 def read_campaign(folder: Path | str) -> Campaign:
@@ -286,16 +299,7 @@ def _read_material(table: Table, sample: Sample) -> tuple[Material, tuple[float,
         raise table.wrong("p_m_range_Pa", f"{p_m_range} does not grow; write the smaller pressure first")
     material = Material(
         p_m=math.sqrt(low * high),
-        phi_1=table.number("phi_1", 0.0, 0.74),
-        phi_2=table.number("phi_2", 0.01, 1.0),
-        delta=table.number("delta", 0.01, 5.0),
-        tensile_log10_a=table.number("tensile_log10_a", -5.0, 9.0),
-        tensile_log10_b=table.number("tensile_log10_b", -20.0, 20.0),
-        shear_factor=table.number("shear_factor", 0.0, 100.0),
-        bulk_modulus=table.number("bulk_modulus_Pa", 100.0, 1e9),
-        bulk_exponent=table.number("bulk_exponent", 0.0, 15.0),
-        shear_to_bulk=table.number("shear_to_bulk", 1e-3, 1.5),
-        contact_friction=table.number("contact_friction", 0.0, 5.0),
+        **{field: table.number(key, least, most) for key, (field, least, most) in MATERIAL_KEYS.items()},
     )
     if material.phi_2 <= material.phi_1:
         raise table.wrong("phi_2", f"{material.phi_2:g} is not above phi_1 = {material.phi_1:g}; raise it")

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from ..inference.emulator import Emulator, fit_emulator
-from ..inference.planar import planar_setting, round_depth
+from ..inference.planar import campaign_setting, round_depth
 from ..inference.runs import Progress, RunStore, require_runs
 from ..inference.summary import COARSE, Reading, SummaryCalibration, impact_speed
 from ..records import Drop, FloatArray, PublishedScan
@@ -204,7 +204,7 @@ def _spread(low: float, high: float) -> list[float]:
 
 
 def _setting(calibration: SummaryCalibration, drop: Drop, speed: float, p_m: float) -> DropSetting:
-    return planar_setting(
+    return campaign_setting(
         calibration.campaign,
         drop.projectile,
         speed,

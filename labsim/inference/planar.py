@@ -9,16 +9,15 @@ one. Both readings, and none at all, are offered, recorded, and stand beside eac
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 
-from ..records import Campaign, Projectile
+from ..records import Campaign, Material, Planar, Projectile
 from ..sph import DropSetting, Numerics
 
 PLANAR_FACTOR = 8.0 / (3.0 * math.pi)
 DURATION_PER_RADIUS = (
     40.0  # s/m: 22 ms for that cylinder, several stopping times of the softest dust in the prior
 )
+SPACING = 1.0e-4  # m, for the radius that the box belongs to
 ALPHA = 0.1  # artificial viscosity; more of it would stop the projectile in place of the dust
 
 READINGS = {
@@ -41,50 +40,61 @@ def round_depth(raw: float, reading: str) -> float:
 
 
 def planar_setting(
+    projectile: Projectile,
+    speed: float,
+    material: Material,
+    *,
+    filling_factor: float = 0.15,
+    monomer_density: float = 2000.0,
+    gravity: float = 0.0,
+    box: Planar | None = None,
+    spacing: float | None = None,
+) -> DropSetting:
+    """The cylinder that stands for a round projectile: same radius, density of a sphere of that radius and mass.
+
+    The box scales with the radius; so does the spacing (m), where none is given.
+    """
+    box = box or Planar()
+    radius = projectile.tip_radius
+    scale = radius / box.box_radius
+    density = projectile.mass / (4.0 / 3.0 * math.pi * radius**3)
+    return DropSetting(
+        projectile=Projectile(tip="cylinder", tip_radius=radius, mass=density * math.pi * radius**2),
+        impact_speed=speed,
+        material=material,
+        filling_factor=filling_factor,
+        monomer_density=monomer_density,
+        gravity=gravity,
+        geometry="planar",
+        spacing=spacing if spacing is not None else SPACING * scale,
+        duration=DURATION_PER_RADIUS * radius,
+        after_stop=0.0,
+        width=box.box_width * scale,
+        depth=box.box_depth * scale,
+        numerics=Numerics(alpha=ALPHA),
+    )
+
+
+def campaign_setting(
     campaign: Campaign,
     projectile: Projectile,
     speed: float,
     p_m: float,
     *,
     bulk_modulus: float | None = None,
-    spacing: float = 1.0e-4,
+    spacing: float = SPACING,
 ) -> DropSetting:
-    """The cylinder that stands for a round projectile.
-
-    Same radius, and the density of a sphere of that radius and mass. ``spacing`` (m) is meant for the radius that
-    the box belongs to; box and spacing scale with the radius, so every size has the same number of particles.
-    """
-    radius = projectile.tip_radius
-    scale = radius / campaign.planar.box_radius
-    density = projectile.mass / (4.0 / 3.0 * math.pi * radius**3)
+    """The planar run of one projectile of a campaign; ``spacing`` (m) is meant for the radius the box belongs to."""
     material = campaign.material.replace(p_m=float(p_m))
     if bulk_modulus is not None:
         material = material.replace(bulk_modulus=float(bulk_modulus))
-    return DropSetting(
-        projectile=replace(
-            projectile, tip="cylinder", mass=density * math.pi * radius**2, mass_sigma=0.0, length=0.0
-        ),
-        impact_speed=speed,
-        material=material,
+    return planar_setting(
+        projectile,
+        speed,
+        material,
         filling_factor=campaign.sample.filling_factor,
         monomer_density=campaign.sample.monomer_density,
         gravity=campaign.gravity,
-        geometry="planar",
-        spacing=spacing * scale,
-        duration=DURATION_PER_RADIUS * radius,
-        after_stop=0.0,
-        numerics=Numerics(alpha=ALPHA),
-        width=campaign.planar.box_width * scale,
-        depth=campaign.planar.box_depth * scale,
+        box=campaign.planar,
+        spacing=spacing * projectile.tip_radius / campaign.planar.box_radius,
     )
-
-
-def settings_over(
-    campaign: Campaign,
-    projectile: Projectile,
-    speeds: Sequence[float],
-    p_m: Sequence[float],
-    **options: float | None,
-) -> list[DropSetting]:
-    """One setting per p_m and speed, p_m slowest."""
-    return [planar_setting(campaign, projectile, v, p, **options) for p in p_m for v in speeds]  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ import h5py
 import numpy as np
 import platformdirs
 
-from ..errors import InferenceError, LabsimError, SimulationError
+from ..errors import InferenceError, SimulationError
 from ..sph import DropRun, DropSetting, simulate, solver_hash
 from .workers import open_executor
 
@@ -100,14 +100,14 @@ class RunStore:
         except (OSError, KeyError, ValueError):
             return None
 
-    def save(self, setting: DropSetting, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
+    def save(self, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
         """Write aside, flush to the disk, rename: there is never half a file under a run's name."""
-        key = make_key(setting)
+        key = make_key(run.setting)
         path = self.path(key)
         path.parent.mkdir(exist_ok=True)
         aside = path.with_name(f".{key}.{os.getpid()}.part")
         try:
-            _write(aside, key, setting, run, wall)
+            write_run_file(aside, run, wall)
             with aside.open("rb") as stream:
                 os.fsync(stream.fileno())
             os.replace(aside, path)
@@ -174,7 +174,7 @@ class RunStore:
                     key, setting, lock = running.pop(future)
                     try:
                         run, wall = future.result()
-                        self.save(setting, run, wall)
+                        self.save(run, wall)
                     finally:
                         lock.release()
                     self.new += 1
@@ -285,11 +285,13 @@ def _exact(value: Any) -> Any:
     )
 
 
-def _write(path: Path, key: str, setting: DropSetting, run: DropRun | FailedRun, wall: float) -> None:
+def write_run_file(path: Path, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
+    """A run with its setting as one HDF5 file: arrays as datasets, the rest as attributes (JSON)."""
+    setting = run.setting
     with h5py.File(path, "w") as stored:
         stored.attrs.update(
             format=FORMAT,
-            key=key,
+            key=make_key(setting),
             solver=solver_hash(),
             setting_key=canonical(setting),
             setting=json.dumps(dataclasses.asdict(setting)),
@@ -302,6 +304,19 @@ def _write(path: Path, key: str, setting: DropSetting, run: DropRun | FailedRun,
             stored.attrs["message"] = run.message
         else:
             _pack(stored, run, skip={"setting"})
+    return path
+
+
+def read_run_file(path: Path | str) -> DropRun | FailedRun:
+    """The run in a file, with its setting. Raises InferenceError where it is not a run."""
+    try:
+        with h5py.File(path, "r") as stored:
+            setting = _build(DropSetting, json.loads(stored.attrs["setting"]))
+        run = _read(Path(path), setting)
+    except (OSError, KeyError, ValueError, TypeError) as trouble:
+        raise InferenceError(path, "", f"is not a stored run ({trouble}); make it again") from None
+    assert run is not None
+    return run
 
 
 def _read(path: Path, setting: DropSetting) -> DropRun | FailedRun | None:
@@ -351,6 +366,22 @@ def _pack(group: h5py.Group, record: Any, skip: set[str] = frozenset()) -> None:
             group.attrs[field.name] = json.dumps(value, default=lambda item: item.item())
 
 
+def _build(kind: type, values: dict[str, Any]) -> Any:
+    """A record of plain data from what ``dataclasses.asdict`` made of it."""
+    hints = typing.get_type_hints(kind)
+    built = {}
+    for name, value in values.items():
+        if dataclasses.is_dataclass(hints[name]):
+            built[name] = _build(hints[name], value)  # type: ignore[arg-type]
+        else:
+            built[name] = _as_tuple(value)
+    return kind(**built)
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(_as_tuple(item) for item in value) if isinstance(value, list) else value
+
+
 def _unpack(group: h5py.Group, kind: type, given: dict[str, Any] | None = None) -> Any:
     hints = typing.get_type_hints(kind)
     values = dict(given or {})
@@ -366,21 +397,5 @@ def _unpack(group: h5py.Group, kind: type, given: dict[str, Any] | None = None) 
                 record = next(option for option in nested if dataclasses.is_dataclass(option))
                 values[field.name] = _unpack(item, record)  # type: ignore[arg-type]
         else:
-            value = json.loads(group.attrs[field.name])
-            values[field.name] = tuple(value) if isinstance(value, list) else value
+            values[field.name] = _as_tuple(json.loads(group.attrs[field.name]))
     return kind(**values)
-
-
-__all__ = [
-    "DropRun",
-    "FailedRun",
-    "LabsimError",
-    "RunStore",
-    "Stored",
-    "canonical",
-    "default_store",
-    "estimate_cost",
-    "make_key",
-    "require_runs",
-    "run_one",
-]

@@ -23,7 +23,7 @@ from ..errors import InferenceError
 from ..records import Campaign, Drop, FloatArray
 from ..sph import DropRun
 from .emulator import Emulator, fit_emulator
-from .planar import READINGS, expected_raw_depth, planar_setting
+from .planar import READINGS, SPACING, campaign_setting, expected_raw_depth
 from .runs import Progress, RunStore, require_runs
 
 USES = ("depth", "stopping_time")
@@ -33,7 +33,7 @@ OTHER_BULK_MODULI = (
     45.0e3,
     300.0e3,
 )  # Pa; the literature on this dust has used the first and the last
-COARSE, FINE = 1.0e-4, 0.5e-4  # m, at the radius the box belongs to
+COARSE, FINE = SPACING, SPACING / 2  # m, at the radius the box belongs to
 DEGREE = 3
 RUNS_PER_EMULATOR = 7
 
@@ -279,7 +279,7 @@ def _published(drop: Drop, kind: str):  # type: ignore[no-untyped-def]
 
 
 def _setting(campaign: Campaign, drop: Drop, p_m: float, k0: float, spacing: float):  # type: ignore[no-untyped-def]
-    return planar_setting(
+    return campaign_setting(
         campaign, drop.projectile, impact_speed(drop, campaign), p_m, bulk_modulus=k0, spacing=spacing
     )
 

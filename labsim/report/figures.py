@@ -16,6 +16,7 @@ import corner
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.spatial import KDTree
 
 from ..diagnosis.summary import SummaryDiagnosis, compacted_area
 from ..inference.planar import expected_raw_depth, round_depth
@@ -73,32 +74,27 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
                 label=f"{run.setting.material.p_m / 1e3:.2f} kPa",
             )
             axes.plot(run.stopping_time * 1e3, run.penetration_depth * 1e3, "o", color=colour, ms=5)
+        axes.set(xlabel="time since contact (ms)", ylabel="raw planar depth (mm)", xlim=(0, None))
+        bottom = 1.12 * axes.get_ylim()[1]
+        axes.set_ylim(bottom, 0.0)
         if published.penetration_depth is not None:
             target = expected_raw_depth(published.penetration_depth.value, calibration.depth_reading) * 1e3
             axes.axhline(target, color=INK, lw=1.0, ls="--")
-            axes.annotate(f" published depth, {target:.2f} mm", (0.0, target), va="bottom", color=INK)
+            axes.text(0.03, target, f"published depth, {target:.2f} mm raw", va="bottom")
         if published.stopping_time is not None:
             at = published.stopping_time
             axes.axvspan(
                 (at.value - at.sigma) * 1e3, (at.value + at.sigma) * 1e3, color=GREY, alpha=0.25, lw=0
             )
             axes.axvline(at.value * 1e3, color=INK, lw=1.0, ls="--")
-            axes.annotate(
-                f"published stopping time, {at.value * 1e3:.1f} ms ",
-                (at.value * 1e3, axes.get_ylim()[1]),
-                rotation=90,
-                ha="right",
-                va="top",
-                color=INK,
-            )
-        axes.set(xlabel="time since contact (ms)", ylabel="raw planar depth (mm)", xlim=(0, None))
-        axes.invert_yaxis()
+            axes.text((at.value - 1.3 * at.sigma) * 1e3, 0.01 * bottom, f"published stopping time, {at.value * 1e3:.1f} ms",
+                      rotation=90, ha="right", va="top")  # fmt: skip
         setting = runs[middle].setting
         axes.set_title(
             f"{2e3 * setting.projectile.tip_radius:g} mm cylinder at {setting.impact_speed:g} m/s, "
             f"K0 {calibration.bulk_modulus / 1e3:g} kPa; dots: v = 0"
         )
-        axes.legend(title="p_m", loc="lower left")
+        axes.legend(title="p_m", loc="upper right", bbox_to_anchor=(0.84, 1.0))
     return path
 
 
@@ -183,7 +179,7 @@ def draw_compacted_volume(diagnosis: SummaryDiagnosis, path: Path) -> Path:
             axes.annotate(" undisturbed", (run.setting.filling_factor, 2e-3), color=GREEN)
             axes.set(ylim=(1e-3, None))
             axes.set_title(
-                f"{2e3 * run.setting.projectile.tip_radius:g} mm at {run.setting.impact_speed:g} m/s, "
+                f"{2e3 * run.setting.projectile.tip_radius:g} mm at {run.setting.impact_speed:.2f} m/s, "
                 f"p_m {run.setting.material.p_m / 1e3:.2f} kPa"
             )
         axes.set(
@@ -205,21 +201,18 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
         across, z, phi = np.concatenate([-across, across]), np.tile(z, 2), np.tile(phi, 2)
     half = 4.5 * radius
     deep = run.penetration_depth + 3.0 * radius
-    shown = (np.abs(across) < half) & (z > -deep)
-    with new_figure(path, 6.4, 4.8) as figure:
+    # each point shows the nearest particle; beyond 1.5 spacings there is no dust
+    step = setting.spacing / 3.0
+    columns = np.arange(-half, half + step, step)
+    rows = np.arange(-deep, 1.2 * radius, step)
+    distance, nearest = KDTree(np.column_stack([across, z])).query(
+        np.stack(np.meshgrid(columns, rows), axis=-1), distance_upper_bound=1.5 * setting.spacing
+    )
+    field = np.where(np.isfinite(distance), np.append(phi, np.nan)[nearest], np.nan)
+    with new_figure(path, 6.8, 4.4) as figure:
         axes = figure.add_subplot()
-        points_per_metre = 72.0 * 4.9 / (2 * half)
-        size = (1.15 * setting.spacing * points_per_metre) ** 2
-        drawn = axes.scatter(
-            across[shown] * 1e3,
-            z[shown] * 1e3,
-            c=phi[shown],
-            s=size,
-            marker="s",
-            lw=0,
-            cmap="viridis",
-            vmin=0.12,
-            vmax=0.30,
+        drawn = axes.pcolormesh(
+            columns * 1e3, rows * 1e3, field, cmap="viridis", vmin=0.12, vmax=0.30, rasterized=True
         )
         centre = radius - run.penetration_depth
         angle = np.linspace(0.0, 2 * np.pi, 181)
@@ -233,7 +226,7 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
         axes.axhline(0.0, color=INK, lw=0.6, ls=":")
         axes.set(aspect="equal", xlabel="mm", ylabel="height above the undisturbed surface (mm)")
         axes.set_xlim(-half * 1e3, half * 1e3)
-        axes.set_ylim(-deep * 1e3, max(1.2 * radius, centre + 1.1 * radius) * 1e3)
+        axes.set_ylim(-deep * 1e3, 1.2 * radius * 1e3)
         figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
         axes.set_title(
             title
@@ -275,7 +268,9 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
             show_titles=True,
             title_fmt=".2f",
             title_kwargs={"fontsize": 9},
-            plot_datapoints=False,
+            plot_contours=False,
+            plot_density=False,
+            data_kwargs={"alpha": 0.05, "ms": 2.0},
         )
         figure.text(
             0.98, 0.98, f"p_m from {_used(calibration)}\norange: published", ha="right", va="top", color=INK
@@ -317,11 +312,11 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
             stop.axhline(at.value * 1e3, color=INK, lw=1.0, label=f"{at.value * 1e3:.1f} ms, published")
         for axes, label in ((depth, "raw depth (mm)"), (stop, "stopping time (ms)")):
             axes.set(xlabel="p_m (kPa)", ylabel=label)
-            axes.xaxis.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
+            axes.set_xticks([0.2, 0.5, 1, 2, 5], ["0.2", "0.5", "1", "2", "5"])
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
             low, high = axes.get_ylim()
-            ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10) if low <= t <= high]
+            ticks = [t for t in (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if low <= t <= high]
             axes.set_yticks(ticks, [f"{t:g}" for t in ticks])
             axes.legend(fontsize=7.5)
         forest = figure.add_subplot(grid[:, 1])
@@ -340,7 +335,7 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
         forest.set_xticks(ticks, [f"{t:g}" for t in ticks])
         forest.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
         forest.set(xlabel="p_m (kPa), median and 90 %")
-        forest.set_title("orange: this calibration; grey: no p_m fits both (χ² > 6.6)")
+        forest.set_title("orange: this one; grey: no p_m fits both (χ² > 6.6)")
         depth.set_title(f"{drop}: emulator (lines) and its runs (dots)")
     return path
 
