@@ -17,7 +17,7 @@ from scipy.stats import chi2, norm
 
 from ..inference.emulator import Emulator, fit_emulator
 from ..inference.planar import campaign_setting, round_depth
-from ..inference.runs import Progress, RunStore, require_runs
+from ..inference.runs import Progress, RunStore, require_stopped
 from ..inference.summary import COARSE, Reading, SummaryCalibration, impact_speed
 from ..records import Drop, FloatArray, PublishedScan
 from ..sph import DropRun, DropSetting
@@ -144,7 +144,7 @@ def diagnose_summary(
     results = store.get_many(
         plan, workers=workers, scheduler=scheduler, progress=progress, text="prediction runs"
     )
-    runs = require_runs(results)
+    runs = require_stopped(results)
 
     sizes = []
     for radius, drops in sorted(groups.items()):

@@ -264,6 +264,19 @@ def require_runs(runs: Sequence[DropRun | FailedRun]) -> list[DropRun]:
     return [run for run in runs if isinstance(run, DropRun)]
 
 
+def require_stopped(runs: Sequence[DropRun | FailedRun]) -> list[DropRun]:
+    """As ``require_runs``, and every projectile has come to rest: depth and stopping time mean what they say."""
+    done = require_runs(runs)
+    for run in done:
+        if not run.stopped:
+            raise SimulationError(
+                "simulation",
+                "duration",
+                f"{run.setting.duration:g} s was too short for {_label(run.setting)}; raise it",
+            )
+    return done
+
+
 def estimate_cost(setting: DropSetting) -> float:
     """Relative cost of a run: particles times steps (the sound speed goes with the root of the bulk modulus)."""
     width, depth = setting.extent
@@ -303,7 +316,7 @@ def write_run_file(path: Path, run: DropRun | FailedRun, wall: float = 0.0) -> P
         if isinstance(run, FailedRun):
             stored.attrs["message"] = run.message
         else:
-            _pack(stored, run, skip={"setting"})
+            _pack(stored.create_group("run"), run, skip={"setting"})
     return path
 
 
@@ -325,7 +338,7 @@ def _read(path: Path, setting: DropSetting) -> DropRun | FailedRun | None:
     with h5py.File(path, "r") as stored:
         if stored.attrs["status"] == "failed":
             return FailedRun(setting, str(stored.attrs["message"]))
-        return _unpack(stored, DropRun, given={"setting": setting})
+        return _unpack(stored["run"], DropRun, given={"setting": setting})
 
 
 def _read_label(path: Path) -> Stored:

@@ -24,7 +24,7 @@ from ..records import Campaign, Drop, FloatArray
 from ..sph import DropRun
 from .emulator import Emulator, fit_emulator
 from .planar import READINGS, SPACING, campaign_setting, expected_raw_depth
-from .runs import Progress, RunStore, require_runs
+from .runs import Progress, RunStore, require_stopped
 
 USES = ("depth", "stopping_time")
 REFERENCE_P_M = 1300.0  # Pa, the seed's dynamic value: where the two spacings are compared
@@ -164,7 +164,7 @@ def calibrate_summary(
         plan, workers=workers, scheduler=scheduler, progress=progress, text="calibration runs"
     )
     runs: dict[tuple[str, float], list[DropRun]] = {}
-    for place, run in zip(where, require_runs(results), strict=True):
+    for place, run in zip(where, require_stopped(results), strict=True):
         runs.setdefault(place, []).append(run)
 
     emulators = {

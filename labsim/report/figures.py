@@ -201,12 +201,12 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
         across, z, phi = np.concatenate([-across, across]), np.tile(z, 2), np.tile(phi, 2)
     half = 4.5 * radius
     deep = run.penetration_depth + 3.0 * radius
-    # each point shows the nearest particle; beyond 1.5 spacings there is no dust
+    # each point shows the nearest particle; beyond 0.8 spacings there is no dust
     step = setting.spacing / 3.0
     columns = np.arange(-half, half + step, step)
     rows = np.arange(-deep, 1.2 * radius, step)
     distance, nearest = KDTree(np.column_stack([across, z])).query(
-        np.stack(np.meshgrid(columns, rows), axis=-1), distance_upper_bound=1.5 * setting.spacing
+        np.stack(np.meshgrid(columns, rows), axis=-1), distance_upper_bound=0.8 * setting.spacing
     )
     field = np.where(np.isfinite(distance), np.append(phi, np.nan)[nearest], np.nan)
     with new_figure(path, 6.8, 4.4) as figure:
@@ -318,7 +318,7 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
             low, high = axes.get_ylim()
             ticks = [t for t in (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if low <= t <= high]
             axes.set_yticks(ticks, [f"{t:g}" for t in ticks])
-            axes.legend(fontsize=7.5)
+            axes.legend(fontsize=7.5, loc="upper right", framealpha=0.85, frameon=True, edgecolor="none")
         forest = figure.add_subplot(grid[:, 1])
         rows = sorted(calibration.readings, key=lambda r: (-r.bulk_modulus, len(r.use), r.use, r.q50))
         for place, row in enumerate(rows):
