@@ -79,7 +79,9 @@ _UsageTrouble = next(base for base in typer.BadParameter.__mro__ if base.__name_
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and leave: 0 done, 2 bad input (one line on standard error), 130 stopped by the user."""
     try:
-        status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+        status = app(
+            args=None if arguments is None else list(arguments), prog_name="labsim", standalone_mode=False
+        )
     except LabsimError as trouble:
         status = _complain(str(trouble), 2)
     except _UsageTrouble as trouble:

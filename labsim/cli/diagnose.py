@@ -62,12 +62,13 @@ def diagnose(
 def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:
     """Files of a calibration and its diagnosis; the summary and the lines for people."""
     from ..report.figures import draw_compacted_volume, draw_density_field, draw_depth_law, draw_penetration
-    from ..report.tables import diagnosis_lines, diagnosis_summary
+    from ..report.tables import diagnosis_lines, diagnosis_summary, model_text
 
     calibration = found.calibration
     write_calibration(calibration, folder)
     summary = diagnosis_summary(found)
     options.write_json(folder / "diagnosis.json", summary)
+    (folder / "model.toml").write_text(model_text(calibration))
     draw_penetration(calibration, folder / "penetration.png")
     draw_depth_law(found, folder / "depth_law.png")
     draw_compacted_volume(found, folder / "compacted_volume.png")

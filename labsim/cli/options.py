@@ -91,9 +91,9 @@ def _finite(value: Any) -> Any:
 
 
 class Progress(Protocol):
-    """What long work calls: ``progress(done, total, text)``, as often as it likes."""
+    """What long work calls: ``progress(done, total, text)``, as often as it likes, in any unit of work."""
 
-    def __call__(self, done: int, total: int, text: str) -> None: ...
+    def __call__(self, done: float, total: float, text: str) -> None: ...
 
 
 @contextmanager
@@ -105,7 +105,7 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
         from rich.console import Console
         from rich.progress import (
             BarColumn,
-            MofNCompleteColumn,
+            TaskProgressColumn,
             TextColumn,
             TimeElapsedColumn,
             TimeRemainingColumn,
@@ -115,7 +115,7 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
-            MofNCompleteColumn(),
+            TaskProgressColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
@@ -123,7 +123,7 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
         with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
             tasks: dict[str, Any] = {}
 
-            def report(done: int, total: int, text: str) -> None:
+            def report(done: float, total: float, text: str) -> None:
                 if text not in tasks:
                     tasks[text] = bars.add_task(text, total=total)
                 bars.update(tasks[text], completed=done, total=total)
@@ -139,7 +139,7 @@ class _LineReport:
     def __init__(self) -> None:
         self.text, self.began, self.last = "", 0.0, 0.0
 
-    def __call__(self, done: int, total: int, text: str) -> None:
+    def __call__(self, done: float, total: float, text: str) -> None:
         now = time.monotonic()
         if text != self.text:
             self.text, self.began, self.last = text, now, -math.inf
@@ -147,4 +147,4 @@ class _LineReport:
             return
         self.last = now
         left = f", about {(now - self.began) * (total - done) / done:.0f} s left" if 0 < done < total else ""
-        typer.echo(f"{text}: {done} of {total}{left}", err=True)
+        typer.echo(f"{text}: {done / total:.0%}{left}", err=True)

@@ -36,20 +36,21 @@ def runs(
         damaged = opened.verify()
         for file, reason in damaged:
             typer.echo(f"{file}: {reason}", err=True)
+        total = len(list(opened.folder.glob("??/*.h5")))
         summary = {
             "store": opened.folder,
-            "runs": len(opened.index()),
+            "runs": total,
             "damaged": [str(f) for f, _ in damaged],
         }
         options.finish(
             summary,
-            f"{opened.folder}: {summary['runs']} runs whole, {len(damaged)} damaged",
+            f"{opened.folder}: {total - len(damaged)} runs whole, {len(damaged)} damaged",
             as_json=as_json,
             quiet=quiet,
         )
         if damaged:
             raise InferenceError(
-                opened.folder, "", f"{len(damaged)} files are damaged; labsim runs prune removes them"
+                opened.folder, "", f"{len(damaged)} of {total} files damaged; labsim runs prune removes them"
             )
         return
     if action is Action.prune:

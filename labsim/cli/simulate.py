@@ -16,7 +16,7 @@ from ..inference.planar import planar_setting
 from ..inference.runs import RunStore, require_runs, write_run_file
 from ..inference.summary import impact_speed
 from ..records import Campaign, Drop, Material, Projectile
-from ..sph import DropRun, DropSetting
+from ..sph import DropRun, DropSetting, check_setting
 from ..tables import Document, Table
 from . import options
 
@@ -137,6 +137,8 @@ def simulate(
     if time_ms is not None:
         setting = setting.replace(duration=_between("--time-ms", time_ms, 1e-3, 1e4) * 1e-3)
     plan = refine(setting, spacings) if spacings is not None else [setting]
+    for each in plan:
+        check_setting(each)  # before a folder is made
     source = campaign if campaign is not None else Path.cwd() / "drop"
     folder = options.make_output_folder(out, source, f"simulate-{drop}" if drop else "simulate")
     with options.show_progress(quiet) as progress:

@@ -82,6 +82,9 @@ class SummaryDiagnosis:
     predictions: tuple[Prediction, ...]
     drop_predictions: tuple[Prediction, ...]  # drop by drop
     scaling: SizeScaling | None
+    exponents: dict[
+        float, tuple[float, float]
+    ]  # by radius: n and sigma of D ∝ (m v/A)^n; the published law has 1
     conflict: (
         tuple[Reading, Reading, float] | None
     )  # depth alone, stopping time alone, difference in sigma of ln p_m
@@ -175,6 +178,7 @@ def diagnose_summary(
         predictions=tuple(rows),
         drop_predictions=tuple(drop_rows),
         scaling=scaling,
+        exponents={size.radius: _exponent(calibration, size, p_m) for size in sizes if len(size.drops) > 1},
         conflict=conflict,
         p_value=p_value,
         probability_wrong=probability,
@@ -395,6 +399,15 @@ def _compare_sizes(
         observed=t_b / t_a,
         observed_sigma=t_b / t_a * math.hypot(s_a / t_a, s_b / t_b),
     )
+
+
+def _exponent(calibration: SummaryCalibration, size: _Size, p_m: FloatArray) -> tuple[float, float]:
+    """n of D ∝ (m v/A)^n over the speeds of one size's drops, between the slowest and the fastest."""
+    speeds = [impact_speed(drop, calibration.campaign) for drop in size.drops]
+    low, high = min(speeds), max(speeds)
+    n = np.log(size.predict(p_m, high)[:, 0] / size.predict(p_m, low)[:, 0]) / math.log(high / low)
+    emulated = math.sqrt(2.0) * float(size.emulator.sigma[0]) / math.log(high / low)
+    return float(n.mean()), math.hypot(float(n.std()), emulated)
 
 
 def _calibrated_rows(calibration: SummaryCalibration) -> list[Prediction]:

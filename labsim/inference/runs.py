@@ -32,7 +32,7 @@ from ..sph import DropRun, DropSetting, simulate, solver_hash
 from .workers import open_executor
 
 FORMAT = 1  # of the stored files; part of the key
-Progress = Callable[[int, int, str], None]
+Progress = Callable[[float, float, str], None]  # work done, all work (in any unit), what is done
 
 
 @dataclass(frozen=True)
@@ -126,6 +126,7 @@ class RunStore:
     ) -> list[DropRun | FailedRun]:
         """Runs of all settings, in their order; equal settings are run once, the longest first.
 
+        progress is told the cost that is done and the cost of what was missing, so that the time left can be told.
         Raises InferenceError when a worker process dies; what was finished by then is stored.
         """
         report = progress or (lambda done, total, text: None)
@@ -137,11 +138,15 @@ class RunStore:
         self.reused += len(results)
         missing = sorted(set(by_key) - set(results), key=lambda key: -estimate_cost(by_key[key]))
         if missing:
-            report(len(results), len(by_key), text)
+            cost = {key: estimate_cost(by_key[key]) for key in missing}
+            done, total = 0.0, sum(cost.values())
+            text += f", {len(missing)} new"
+            report(done, total, text)
             with open_executor(workers, scheduler, len(missing)) as (executor, slots):
                 for key, run in self._run_missing(executor, slots, [(key, by_key[key]) for key in missing]):
                     results[key] = run
-                    report(len(results), len(by_key), text)
+                    done += cost[key]
+                    report(total if len(results) == len(by_key) else done, total, text)
         return [results[make_key(setting)] for setting in settings]
 
     def _run_missing(

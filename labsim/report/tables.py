@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..campaign import MATERIAL_KEYS
 from ..diagnosis.summary import Prediction, SummaryDiagnosis, people
 from ..inference.planar import READINGS
 from ..inference.summary import REFERENCE_P_M, SummaryCalibration
@@ -79,11 +80,28 @@ def diagnosis_lines(diagnosis: SummaryDiagnosis) -> str:
             f"{scaling.ratio_equal_speed:.2f} at {scaling.speed:.2f} m/s for both, "
             f"{scaling.ratio_equal_momentum:.2f} ± {scaling.ratio_equal_momentum_sigma:.2f} at equal m v/A",
         ]
+    if diagnosis.exponents:
+        found = ", ".join(f"{n:.2f} ± {s:.2f} ({2e3 * r:g} mm)" for r, (n, s) in diagnosis.exponents.items())
+        lines.append(f"  D ∝ (m v/A)^n: published n = 1; simulation {found}")
     lines += [
         "",
         f"verdict: {diagnosis.verdict} (p = {diagnosis.p_value:.2g} for all predictions together): {VERDICTS[diagnosis.verdict]}",
     ]
     return "\n".join(lines + warning_lines(diagnosis.warnings))
+
+
+def model_text(calibration: SummaryCalibration) -> str:
+    """model.toml: the calibrated model, as ``labsim simulate --model`` reads it."""
+    q = calibration.quantiles
+    material = calibration.campaign.material.replace(bulk_modulus=calibration.bulk_modulus)
+    lines = [
+        f"# {calibration.campaign.name}: p_m calibrated on {' and '.join(calibration.use)}; 90 % between",
+        f"# {q['q05']:.0f} and {q['q95']:.0f} Pa",
+        "[material]",
+        f"p_m_Pa = {q['q50']:.1f}",
+    ]
+    lines += [f"{key} = {getattr(material, field)!r}" for key, (field, _low, _high) in MATERIAL_KEYS.items()]
+    return "\n".join(lines) + "\n"
 
 
 def warning_lines(warnings: tuple[str, ...]) -> list[str]:
@@ -164,6 +182,7 @@ def diagnosis_summary(diagnosis: SummaryDiagnosis) -> dict[str, Any]:
             "equal_momentum_per_area": scaling.ratio_equal_momentum,
             "equal_momentum_per_area_sigma": scaling.ratio_equal_momentum_sigma,
         },
+        "depth_exponents": [{"radius_m": r, "n": n, "sigma": s} for r, (n, s) in diagnosis.exponents.items()],
         "numerical_error": {"depth_relative": error.relative("depth"), "spacing_m": error.spacings[0]},
         "runs_new": calibration.runs_new + diagnosis.runs_new,
         "runs_reused": calibration.runs_reused + diagnosis.runs_reused,

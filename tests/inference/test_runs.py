@@ -90,11 +90,11 @@ def test_keys_depend_on_every_value_and_on_the_solver(monkeypatch: pytest.Monkey
 
 def test_many_workers_give_the_numbers_of_one(tmp_path: Path) -> None:
     settings = [small_drop(speed) for speed in (0.2, 0.3, 0.25, 0.3)]
-    seen: list[tuple[int, int]] = []
+    seen: list[tuple[float, float]] = []
     two = RunStore(tmp_path / "two")
     many = two.get_many(settings, workers=2, progress=lambda done, total, text: seen.append((done, total)))
     one = RunStore(tmp_path / "one").get_many(settings, workers=1)
-    assert two.new == 3 and seen[-1] == (3, 3)
+    assert two.new == 3 and len(seen) == 4 and seen[0][0] == 0.0 and seen[-1][0] == seen[-1][1]
     for a, b, setting in zip(require_runs(many), require_runs(one), settings, strict=True):
         assert same(a, b) and a.setting == setting
 

@@ -1,0 +1,163 @@
+"""The command line: what it writes, and one line with status 2 where it cannot."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+
+from labsim.cli import main
+from labsim.inference.runs import read_run_file
+
+SEED = Path(__file__).parents[2] / "data" / "guettler2009"
+QUICK = [
+    "--geometry",
+    "planar",
+    "--set",
+    "material.bulk_modulus_Pa=4500",
+    "--spacing-um",
+    "125",
+    "--speed-m-s",
+    "0.3",
+]
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    return int(left.value.code or 0)
+
+
+@pytest.fixture(autouse=True)
+def own_store(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LABSIM_STORE", str(tmp_path_factory.getbasetemp() / "command-store"))
+
+
+def test_simulate_writes_what_the_contract_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("simulate", "-o", str(tmp_path / "out"), "--json", "--quiet", *QUICK) == 0
+    printed = json.loads(capsys.readouterr().out)
+    folder = tmp_path / "out"
+    summary = json.loads((folder / "run.json").read_text())
+    keys = (
+        "penetration_depth_m stopping_time_s particles steps wall_s updates_per_s momentum_error energy_error"
+    )
+    assert set(keys.split()) <= set(summary) and printed == summary
+    assert summary["setting"]["material"]["bulk_modulus"] == 4500.0
+    curve = pd.read_csv(folder / "curve.csv")
+    assert list(curve.columns) == ["time_s", "depth_m", "velocity_m_s", "force_N_m"]
+    assert curve.depth_m.max() == pytest.approx(summary["penetration_depth_m"], rel=1e-3)
+    run = read_run_file(folder / "run.h5")
+    assert run.penetration_depth == summary["penetration_depth_m"]
+    mesh = meshio.read(folder / "fields" / "stop.vtu")
+    assert len(mesh.points) == summary["particles"]
+    assert np.allclose(np.ravel(mesh.point_data["filling_factor"]), run.particles.filling_factor)
+    assert 'file="stop.vtu"' in (folder / "fields" / "run.pvd").read_text()
+    assert (folder / "run.png").stat().st_size > 10_000 and (folder / "field.png").stat().st_size > 10_000
+
+
+def test_several_spacings_are_extrapolated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("simulate", "-o", str(tmp_path), "--spacings", "2", *QUICK) == 0
+    out = capsys.readouterr().out
+    summary = json.loads((tmp_path / "run.json").read_text())
+    assert summary["penetration_depth_m_sigma"] > 0.0 and summary["stopping_time_s_sigma"] > 0.0
+    coarse, fine = (each["penetration_depth_m"] for each in summary["spacing_study"])
+    ratio = 2**0.5
+    assert summary["penetration_depth_m"] == pytest.approx((ratio * fine - coarse) / (ratio - 1))
+    assert "extrapolated from 2 spacings" in out
+
+
+def test_a_drop_of_a_campaign_and_a_model_file(tmp_path: Path) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text("[material]\np_m_Pa = 900.0\nbulk_modulus_Pa = 4500.0\n")
+    arguments = ["--campaign", str(SEED), "--drop", "S01", "--model", str(model), "--spacing-um", "137"]
+    assert call("simulate", "-o", str(tmp_path / "out"), "--quiet", *arguments) == 0
+    setting = json.loads((tmp_path / "out" / "run.json").read_text())["setting"]
+    assert setting["material"]["p_m"] == 900.0 and setting["material"]["bulk_modulus"] == 4500.0
+    assert setting["impact_speed"] == 0.65 and setting["gravity"] == 0.0 and setting["geometry"] == "planar"
+    assert setting["projectile"]["tip_radius"] == 0.55e-3
+    # a cylinder of the glass bead's density
+    assert setting["projectile"]["mass"] == pytest.approx(2540.0 * np.pi * 0.55e-3**2, rel=1e-3)
+    assert setting["width"] == pytest.approx(8e-3) and setting["depth"] == pytest.approx(5e-3)
+
+
+MISTAKES = {
+    "no such command": (["nonsense"], ["No such command"]),
+    "no such option": (["check", "x", "--nonsense"], ["--nonsense"]),
+    "missing folder": (["check", "/nonexistent"], ["/nonexistent", "no such folder"]),
+    "no argument": (["calibrate"], ["labsim calibrate", "Missing argument"]),
+    "500 mm tip": (["simulate", "--tip-radius-mm", "500"], ["--tip-radius-mm", "500", "write 0.5"]),
+    "negative mass": (["simulate", "--mass-mg", "-1"], ["--mass-mg", "-1", "negative"]),
+    "NaN speed": (["simulate", "--speed-m-s", "nan"], ["--speed-m-s", "nan", "finite"]),
+    "unknown key": (["simulate", "--set", "material.phi3=1"], ["material.phi3", "use one of", "phi_2"]),
+    "not a number": (["simulate", "--set", "material.delta=x"], ["material.delta", "'x'", "number"]),
+    "planar sphere": (["simulate", "--geometry", "planar", "--tip", "sphere"], ["--tip", "sphere", "planar"]),
+    "drop alone": (["simulate", "--drop", "D01"], ["--drop", "--campaign"]),
+    "drop unknown": (["simulate", "--campaign", str(SEED), "--drop", "D99"], ["D99", "name one of", "S01"]),
+    "phi beyond phi2": (["simulate", "--filling-factor", "0.6"], ["filling_factor", "0.6"]),
+    "unknown figure": (["calibrate", str(SEED), "--use", "width"], ["--use", "width", "stopping_time"]),
+    "no figure": (["calibrate", str(SEED), "--use", ","], ["--use", "names no figure"]),
+    "unknown factor": (["calibrate", str(SEED), "--planar-correction", "x"], ["multiply_exp"]),
+    "into the campaign": (["diagnose", str(SEED), "-o", str(SEED / "out")], ["--out", "lies inside"]),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_one_line_and_status_2(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments, words = MISTAKES[name]
+    assert (
+        call(*arguments, *(["--quiet"] if arguments[0] in ("simulate", "calibrate", "diagnose") else [])) == 2
+    )
+    captured = capsys.readouterr()
+    lines = captured.err.splitlines()
+    assert len(lines) == 1 and lines[0].startswith("error: ") and captured.out == ""
+    for word in words:
+        assert word in lines[0]
+    assert not (SEED / "out").exists()
+
+
+def test_runs_are_listed_verified_and_pruned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = ["--store", str(tmp_path / "store")]
+    assert call("simulate", "-o", str(tmp_path / "out"), "--quiet", *QUICK, *store) == 0
+    assert call("runs", "list", *store) == 0
+    assert "0.3 m/s" in capsys.readouterr().out
+    (file,) = (tmp_path / "store").glob("??/*.h5")
+    file.write_bytes(file.read_bytes()[:2000])
+    assert call("runs", "verify", *store) == 2
+    assert "1 of 1 files damaged" in capsys.readouterr().err
+    assert call("runs", "prune", *store) == 0
+    assert call("runs", "verify", *store, "--json") == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["runs"] == 0
+
+
+def test_help_lists_every_command_and_starts_quickly() -> None:
+    shown = subprocess.run(
+        [sys.executable, "-m", "labsim", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(SEED).parents[1],
+    )
+    for command in ("calibrate", "check", "demo", "diagnose", "runs", "simulate"):
+        assert f"\n  {command} " in shown.stdout
+
+
+def test_the_default_output_is_a_new_folder_beside_the_input(tmp_path: Path) -> None:
+    from labsim.cli.options import make_output_folder
+
+    campaign = tmp_path / "series"
+    (campaign / "drops" / "D01").mkdir(parents=True)
+    (campaign / "campaign.toml").write_text("")
+    first = make_output_folder(None, campaign, "calibrate")
+    assert first == tmp_path / "series-calibrate"
+    (first / "file").write_text("")
+    assert make_output_folder(None, campaign, "calibrate") == tmp_path / "series-calibrate-2"
+    assert make_output_folder(None, campaign / "drops" / "D01", "track") == tmp_path / "series-D01-track"
