@@ -343,7 +343,7 @@ def _read_projectile(table: Table) -> Projectile:
         tip_radius=table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3),
         length=table.number("length_mm", 0.1, 500.0, unit=1e-3, default=0.0),
         mass=table.number("mass_mg", 1e-3, 1e7, unit=1e-6),
-        mass_sigma=table.number("mass_sigma_mg", 0.0, 1e6, unit=1e-6, default=0.0),
+        mass_sigma=table.number(table.sigma_key("mass_mg"), 0.0, 1e6, unit=1e-6, default=0.0),
     )
     _check_density(table, projectile)
     if projectile.mass_sigma >= projectile.mass:
@@ -390,7 +390,7 @@ def _read_camera(table: Table) -> Camera:
         frame_rate=table.number("frame_rate_Hz", 10.0, 1e7),
         pixel_size=table.number("pixel_size_um", 0.1, 2000.0, unit=1e-6),
         surface_row=table.number("surface_row_px", 0.0, 1e5),
-        surface_row_sigma=table.number("surface_row_sigma_px", 0.0, 100.0, default=0.0),
+        surface_row_sigma=table.number(table.sigma_key("surface_row_px"), 0.0, 100.0, default=0.0),
     )
 
 
