@@ -235,8 +235,10 @@ def evolve(
         while fresh and body[2] < limit:
             if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
+            left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
+            steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, n, axisymmetric, source, twice_plane, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps_at_once,
+                state, n, axisymmetric, source, twice_plane, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps,
                 log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
                 numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
@@ -251,7 +253,7 @@ def evolve(
                     f"blew up after {made + max(done, 0)} steps at {body[2] * 1e3:.4g} ms with {setting}",
                 )
             made += done
-            fresh = done == steps_at_once
+            fresh = done == steps
             if body[1] >= 0.0 and stop_step is None:
                 stop_step = made
                 limit = min(limit, body[2] * (1 + setting.after_stop))

@@ -27,6 +27,35 @@ def initial_filling_factor(setting: DropSetting, depth: FloatArray) -> FloatArra
     return setting.filling_factor + crust + setting.filling_gradient * depth
 
 
+def _filling_above(setting: DropSetting, depth: FloatArray) -> FloatArray:
+    """Integral of the initial filling factor from the surface to ``depth``, m."""
+    length = setting.crust_length
+    crust = setting.crust_excess * length * (1 - np.exp(-depth / length)) if setting.crust_excess else 0.0
+    return setting.filling_factor * depth + crust + 0.5 * setting.filling_gradient * depth**2
+
+
+def fill_at_rest(
+    setting: DropSetting, x: FloatArray, z: FloatArray, phi: FloatArray, pressure: FloatArray | float = 0.0
+) -> FloatArray:
+    """State (rows, n) of particles at rest at x, z (m), one a spacing², under an elastic pressure (Pa) alone."""
+    material = setting.material
+    state = np.zeros((len(ROWS), x.size))
+    state[X], state[Z] = x, z
+    state[INITIAL] = phi
+    state[DENSITY] = state[REST_DENSITY] = phi * setting.monomer_density
+    state[RING] = x if setting.geometry == "axisymmetric" else 1.0
+    state[AREA] = setting.spacing**2
+    state[MASS] = state[DENSITY] * state[RING] * state[AREA]
+    state[PRESSURE] = pressure
+    state[ZERO_STRESS] = porous_dust.solve_zero_stress.py_func(
+        phi, state[PRESSURE], material.bulk_modulus, material.bulk_exponent
+    )
+    stiffness = porous_dust.bulk_modulus(phi, material)
+    state[SOUND] = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / state[DENSITY])
+    state[DXX] = state[DZZ] = state[THICKNESS] = 1.0
+    return state
+
+
 def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     """State (rows, n) of the dust at rest on a square lattice whose surface is z = 0, and which particles are walls.
 
@@ -42,23 +71,10 @@ def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     )
     x, z = np.meshgrid((columns + 0.5) * spacing, -(np.arange(round(depth / spacing)) + 0.5) * spacing)
     x, z = x.ravel(), z.ravel()
-    state = np.zeros((len(ROWS), x.size))
-    state[X], state[Z] = x, z
     phi = initial_filling_factor(setting, -z)
-    state[INITIAL] = phi
-    state[DENSITY] = phi * setting.monomer_density
-    state[RING] = x if axisymmetric else 1.0
-    state[MASS] = state[DENSITY] * state[RING] * spacing**2
-    state[AREA] = spacing**2
-    material = setting.material
-    weight_above = state[DENSITY] * setting.gravity * -z
-    pressure = np.minimum(weight_above, 0.8 * porous_dust.compressive_strength(phi, material))
-    stiffness = porous_dust.bulk_modulus(phi, material)
-    state[ZERO_STRESS] = phi / (1.0 + pressure / stiffness)
-    state[PRESSURE] = pressure
-    state[SOUND] = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / state[DENSITY])
-    state[DXX] = state[DZZ] = state[THICKNESS] = 1.0
-    state[REST_DENSITY] = state[DENSITY]
+    weight_above = setting.gravity * setting.monomer_density * _filling_above(setting, -z)
+    strength = porous_dust.compressive_strength(phi, setting.material)
+    state = fill_at_rest(setting, x, z, phi, np.minimum(weight_above, 0.8 * strength))
     edge = width if axisymmetric else width / 2
     wall = (z < -depth + WALL_LAYERS * spacing) | (np.abs(x) > edge - WALL_LAYERS * spacing)
     return state, wall
