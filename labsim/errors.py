@@ -29,3 +29,7 @@ class SimulationError(LabsimError):
 
 class InferenceError(LabsimError):
     """A calibration or a diagnosis that has nothing to stand on."""
+
+
+class EffectError(LabsimError):
+    """An effect's file that breaks the contract, or a value that an effect does not take."""

@@ -1,0 +1,47 @@
+"""The catalogue of what a simulation can get wrong: one file per effect, found by listing ``catalogue``.
+
+Input: a drop setting or an instrument, and the values of an effect's parameters. Output: the setting or the instrument
+with the effect. Nothing is simulated and nothing is compared here.
+"""
+
+from .contract import (
+    KINDS,
+    OBSERVABLES,
+    Effect,
+    Instrument,
+    Kind,
+    Parameter,
+    Place,
+    Values,
+    deepest_dust,
+    deepest_expected,
+    list_places,
+    list_thrown,
+)
+from .loading import CATALOGUE, list_effects, load_effect, load_file, reference_campaign
+from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
+
+__all__ = [
+    "CATALOGUE",
+    "KINDS",
+    "OBSERVABLES",
+    "Effect",
+    "HalfNormal",
+    "Instrument",
+    "Kind",
+    "LogNormal",
+    "Normal",
+    "Parameter",
+    "Place",
+    "Prior",
+    "Uniform",
+    "Values",
+    "deepest_dust",
+    "deepest_expected",
+    "list_effects",
+    "list_places",
+    "list_thrown",
+    "load_effect",
+    "load_file",
+    "reference_campaign",
+]

@@ -1,0 +1,37 @@
+"""The point spread of the CT is wider than assumed: an additional Gaussian of this standard deviation, in quadrature."""
+
+import math
+
+from labsim.effects import HalfNormal, Parameter
+
+title = "The CT's point spread is wider than assumed"
+kind = "measurement"
+
+
+def parameters(campaign):
+    voxel = max((scan.voxel for scan in campaign.scans), default=2.0e-5)
+    return (
+        Parameter(
+            "sigma",
+            "m",
+            null=0.0,
+            limits=(0.0, 10.0 * voxel),
+            prior=HalfNormal(2.0 * voxel),
+            step=1.0 * voxel,
+            symbol="σ",
+            text="Focal spot, motion and reconstruction filters add one or two voxels each.",
+        ),
+    )
+
+
+leaves = "The edge of the bead is soft, and the densest dust next to it is smeared into the halo; volumes are kept."
+references = ("Convolution of Gaussians: variances add",)
+expect = {"penetration_depth": 0}
+
+
+def applies(campaign):
+    return "" if campaign.scans else "there is no CT scan with slices"
+
+
+def change_instrument(instrument, values, place):
+    return instrument.replace(ct_blur=math.hypot(instrument.ct_blur, values["sigma"]))

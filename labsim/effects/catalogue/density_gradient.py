@@ -1,0 +1,39 @@
+"""The filling factor changes linearly with depth: φ0 + gradient depth."""
+
+from labsim.effects import Normal, Parameter, deepest_dust
+
+title = "The filling factor changes with depth"
+kind = "sample"
+
+
+def parameters(campaign):
+    phi, material = campaign.sample.filling_factor, campaign.material
+    depth = deepest_dust(campaign)
+    steepest = 0.6 * (material.phi_2 - phi) / depth
+    return (
+        Parameter(
+            "gradient",
+            "1/m",
+            null=0.0,
+            limits=(-0.8 * (phi - material.phi_1) / depth, steepest),
+            prior=Normal(0.0, 4.0),
+            step=min(2.0, 0.5 * steepest),
+            symbol="dφ/dz",
+            text="Deposits are even to a few percent per cm (0.5 per m); settling, shaking or transport have left twenty "
+            "percent in strength per mm (4 per m).",
+        ),
+    )
+
+
+leaves = (
+    "The deeper the drop, the larger the change: fast and heavy drops deviate from what slow ones say of p_m, in the "
+    "opposite order to a crust. Undisturbed dust in the CT shows it."
+)
+references = (
+    "Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503: layer-wise growth of random ballistic deposits",
+)
+expect = {"penetration_depth": -1, "stopping_time": -1}
+
+
+def change_setting(setting, values, place):
+    return setting.replace(filling_gradient=values["gradient"])

@@ -1,0 +1,33 @@
+"""The frame rate is not the stated rate: times in the video are true times times this factor."""
+
+from labsim.effects import Normal, Parameter
+
+title = "The frame rate is not the stated rate"
+kind = "measurement"
+parameters = (
+    Parameter(
+        "factor",
+        "1",
+        null=1.0,
+        limits=(0.7, 1.4),
+        prior=Normal(1.0, 0.05),
+        step=0.03,
+        symbol="rate/rate0",
+        text="True over stated. Cameras keep their rate, but rates are written down rounded, or as chosen and not as given.",
+    ),
+)
+leaves = (
+    "Speeds and times of all drops are off and depths are not: gravity in the free fall before contact is off by the square "
+    "of the factor, the speed against the drop height by the factor."
+)
+references = ("Free fall: apparent g = g rate_factor^-2 / pixel_factor",)
+expect = {"penetration_depth": 0, "stopping_time": 1}
+
+
+def applies(campaign):
+    tracked = any(drop.record.kind != "summary" for drop in campaign.drops)
+    return "" if tracked else "there are published figures only, and no video or track"
+
+
+def change_instrument(instrument, values, place):
+    return instrument.replace(rate_factor=instrument.rate_factor * values["factor"])

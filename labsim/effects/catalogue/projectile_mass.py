@@ -1,0 +1,29 @@
+"""The projectiles are heavier or lighter than stated, all by the same factor."""
+
+from dataclasses import replace
+
+from labsim.effects import LogNormal, Parameter
+
+title = "The projectiles' mass is not the stated mass"
+kind = "projectile"
+parameters = (
+    Parameter(
+        "factor",
+        "1",
+        null=1.0,
+        limits=(0.5, 2.0),
+        prior=LogNormal(1.0, 0.08),
+        step=0.05,
+        symbol="m/m0",
+        text="True over stated. Balances are better, but masses computed from a diameter and a catalogue density are wrong "
+        "by three times the error of the diameter.",
+    ),
+)
+leaves = "Depth and stopping time of all drops by nearly the same factor, which p_m takes up; two masses at one radius help."
+references = ("Güttler et al. (2009), Powders and Grains: D grows with m v/A",)
+expect = {"penetration_depth": 1, "stopping_time": 1}
+
+
+def change_setting(setting, values, place):
+    projectile = setting.projectile
+    return setting.replace(projectile=replace(projectile, mass=projectile.mass * values["factor"]))

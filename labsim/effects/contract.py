@@ -1,0 +1,279 @@
+"""What an effect is: the records that its file is made of and is called with.
+
+An effect is a file with module-level names (docs/effects.md has them in a table): title, kind, parameters, leaves,
+references, expect, applies(campaign) and at least one of change_setting(setting, values, place) and
+change_instrument(instrument, values, place). Every effect is a nested extension of the nominal model: at the null of its
+parameters it changes nothing, bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..errors import EffectError
+from ..records import Campaign, FloatArray, Material, Sample, Tip
+from ..sph import DropSetting
+from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
+
+Kind = Literal["material", "sample", "contact", "projectile", "measurement", "numerics"]
+KINDS: tuple[Kind, ...] = ("material", "sample", "contact", "projectile", "measurement", "numerics")
+OBSERVABLES = ("penetration_depth", "stopping_time", "compacted_volume")
+STOPPING_GRAVITY = 9.81  # m/s^2, that drops fall with, whatever the nominal model holds
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect, in the unit that is reported.
+
+    null: the value that switches the effect off (for ``shape`` parameters, which do not matter at the null of the others:
+    the value taken where nothing else is said). step: for tangents, towards the natural side. prior: its reason stands
+    in ``text``. symbol: as it is printed.
+    """
+
+    name: str
+    unit: str
+    null: float
+    limits: tuple[float, float]
+    prior: Prior
+    step: float
+    text: str
+    shape: bool = False
+    symbol: str = ""
+
+    def log_prior(self, value: FloatArray | float) -> np.ndarray:
+        """ln of the prior density cut off at the limits, -inf outside; integrates to one between them."""
+        low, high = self.limits
+        inside = float(self.prior.cdf(high) - self.prior.cdf(low))
+        value = np.asarray(value, dtype=float)
+        density = self.prior.logpdf(value) - math.log(inside)
+        return np.where((value >= low) & (value <= high), density, -np.inf)
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """A value from the prior between the limits."""
+        below, above = (float(self.prior.cdf(limit)) for limit in self.limits)
+        value = float(self.prior.ppf(rng.uniform(below, above)))
+        return min(max(value, self.limits[0]), self.limits[1])
+
+    @property
+    def scale(self) -> float:
+        """How far from null the prior expects the value (root mean square): the unit of dimensionless amplitudes."""
+        low, high = (float(self.prior.cdf(limit)) for limit in self.limits)
+        quantiles = low + (high - low) * (np.arange(400) + 0.5) / 400
+        return float(np.sqrt(np.mean((self.prior.ppf(quantiles) - self.null) ** 2)))
+
+
+@dataclass(frozen=True)
+class Place:
+    """One drop or scan of a campaign, as far as an effect may depend on it.
+
+    sequence_fraction: -0.5 for the first drop made, +0.5 for the last, 0 for scans. sample and nominal are what the
+    campaign states; p_m stays in ``setting.material``. tip: of the stated projectile.
+    smallest_tip_radius: of the campaign's drops, m.
+    """
+
+    name: str
+    sequence_fraction: float
+    is_scan: bool
+    sample: Sample
+    nominal: Material
+    tip: Tip = "hemisphere"
+    smallest_tip_radius: float = 0.5e-3
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What the measurement is, relative to what is stated of it; at these defaults all statements are true."""
+
+    pixel_factor: float = 1.0  # true over stated pixel size
+    rate_factor: float = 1.0  # true over stated frame rate
+    row_offset_px: float = 0.0  # true minus stated row of the surface, px
+    ct_scale: float = 1.0  # true over stated grey level per density
+    ct_blur: float = (
+        0.0  # m, standard deviation of additional point spread, in quadrature with the assumed one
+    )
+
+    def replace(self, **changes: float) -> Instrument:
+        return replace(self, **changes)
+
+    def stated_time(self, time: FloatArray) -> FloatArray:
+        """Time (s) that the stated frame rate gives to an instant of true time (s)."""
+        return np.asarray(time) * self.rate_factor
+
+    def stated_depth(self, depth: FloatArray, pixel_size: float) -> FloatArray:
+        """Depth (m) that the stated pixel size (m) and surface row give to a true depth (m)."""
+        return np.asarray(depth) / self.pixel_factor + self.row_offset_px * pixel_size
+
+    def stated_filling_factor(self, filling_factor: FloatArray) -> FloatArray:
+        """Filling factor that the stated grey calibration gives, before blur."""
+        return np.asarray(filling_factor) * self.ct_scale
+
+
+Values = Mapping[str, float]
+ChangeSetting = Callable[[DropSetting, Values, Place], DropSetting]
+ChangeInstrument = Callable[[Instrument, Values, Place], Instrument]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect as loaded and checked, with its parameters resolved for one campaign."""
+
+    name: str
+    title: str
+    kind: Kind
+    parameters: tuple[Parameter, ...]
+    leaves: str
+    references: tuple[str, ...]
+    expect: Mapping[str, int]
+    file: Path
+    reason_against: Callable[[Campaign], str] = field(repr=False)
+    change_setting: ChangeSetting | None = field(repr=False)
+    change_instrument: ChangeInstrument | None = field(repr=False)
+    resolve: Callable[[Campaign], tuple[Parameter, ...]] = field(repr=False)
+    description: str = ""
+
+    def applies(self, campaign: Campaign) -> str:
+        """Empty if the effect can be at work in this campaign, else the reason why not."""
+        return self.reason_against(campaign)
+
+    def for_campaign(self, campaign: Campaign) -> Effect:
+        """The same effect with nulls, limits and priors of this campaign. Raises EffectError."""
+        return replace(self, parameters=self.resolve(campaign))
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """The parameters that decide whether the effect is on."""
+        return tuple(parameter for parameter in self.parameters if not parameter.shape)
+
+    @property
+    def costs_runs(self) -> bool:
+        """Whether it changes the drop; otherwise only what is read off the instruments."""
+        return self.change_setting is not None
+
+    def parameter(self, name: str) -> Parameter:
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise EffectError(
+            self.file, name, f"is not a parameter of {self.name}; use {self._names() or 'none, it has none'}"
+        )
+
+    def at(self, values: Values | None = None) -> dict[str, float]:
+        """All parameters: those given, checked, and null for the others. Raises EffectError."""
+        full = {parameter.name: float(parameter.null) for parameter in self.parameters}
+        for name, value in (values or {}).items():
+            low, high = self.parameter(name).limits
+            if (
+                isinstance(value, bool)
+                or not isinstance(value, (int, float, np.number))
+                or not math.isfinite(value)
+            ):
+                raise EffectError(self.file, name, f"{value!r} is not a finite number")
+            if not low <= value <= high:
+                raise EffectError(
+                    self.file,
+                    name,
+                    f"{value:.6g} is outside {low:.4g} to {high:.4g} {self.parameter(name).unit}".rstrip(),
+                )
+            full[name] = float(value)
+        return full
+
+    def is_null(self, values: Values) -> bool:
+        """Whether the effect is off at these values; one without parameters never is."""
+        full = self.at(values)
+        return bool(self.amplitudes) and all(full[each.name] == each.null for each in self.amplitudes)
+
+    def draw(self, rng: np.random.Generator) -> dict[str, float]:
+        """All parameters from their priors."""
+        return {parameter.name: parameter.draw(rng) for parameter in self.parameters}
+
+    def log_prior(self, values: Values) -> float:
+        full = {parameter.name: parameter.null for parameter in self.parameters} | dict(values)
+        return float(sum(float(parameter.log_prior(full[parameter.name])) for parameter in self.parameters))
+
+    def apply(self, setting: DropSetting, values: Values, place: Place) -> DropSetting:
+        """The drop with this effect, or the setting itself where the effect does not touch the drop."""
+        return self.change_setting(setting, self.at(values), place) if self.change_setting else setting
+
+    def apply_to_instrument(self, instrument: Instrument, values: Values, place: Place) -> Instrument:
+        return (
+            self.change_instrument(instrument, self.at(values), place)
+            if self.change_instrument
+            else instrument
+        )
+
+    def _names(self) -> str:
+        return ", ".join(parameter.name for parameter in self.parameters)
+
+
+def list_places(campaign: Campaign) -> dict[str, Place]:
+    """The place of every drop and scan of a campaign, by name."""
+    numbers = [drop.sequence for drop in campaign.drops]
+    first, last = min(numbers), max(numbers)
+    smallest = min(drop.projectile.tip_radius for drop in campaign.drops)
+    places = {}
+    for drop in campaign.drops:
+        fraction = (drop.sequence - first) / (last - first) - 0.5 if last > first else 0.0
+        places[drop.name] = Place(
+            drop.name, fraction, False, campaign.sample, campaign.material, drop.projectile.tip, smallest
+        )
+    for scan in (*campaign.scans, *campaign.published_scans):
+        places[scan.name] = Place(
+            scan.name, 0.0, True, campaign.sample, campaign.material, scan.projectile.tip, smallest
+        )
+    return places
+
+
+def list_thrown(campaign: Campaign) -> list[tuple[float, float, float]]:
+    """Tip radius (m), mass (kg) and expected speed at contact (m/s) of every drop and scan, from what is stated."""
+    thrown = []
+    for drop in campaign.drops:
+        speed = math.sqrt(2.0 * STOPPING_GRAVITY * drop.height.value) if drop.height else 0.0
+        if drop.published and drop.published.impact_speed:
+            speed = drop.published.impact_speed.value
+        thrown.append((drop.projectile.tip_radius, drop.projectile.mass, speed))
+    for scan in (*campaign.scans, *campaign.published_scans):
+        thrown.append((scan.projectile.tip_radius, scan.projectile.mass, scan.speed.value))
+    return thrown
+
+
+def deepest_expected(campaign: Campaign) -> float:
+    """Depth (m) that the fastest and heaviest projectile is expected to reach, by D = 8e-4 m v/A (Güttler et al. 2009)."""
+    return max(8e-4 * mass * speed / (math.pi * radius**2) for radius, mass, speed in list_thrown(campaign))
+
+
+def deepest_dust(campaign: Campaign) -> float:
+    """Depth (m) of the dust that simulations of this campaign hold at most; gradients must stay physical down to there."""
+    if campaign.geometry == "planar":
+        box = campaign.planar
+        return max(box.box_depth * radius / box.box_radius for radius, _, _ in list_thrown(campaign))
+    return max(
+        max(6 * radius, 3 * radius + 1.5 * 8e-4 * mass * speed / (math.pi * radius**2))
+        for radius, mass, speed in list_thrown(campaign)
+    )
+
+
+__all__ = [
+    "KINDS",
+    "OBSERVABLES",
+    "Effect",
+    "HalfNormal",
+    "Instrument",
+    "Kind",
+    "LogNormal",
+    "Normal",
+    "Parameter",
+    "Place",
+    "Prior",
+    "Uniform",
+    "Values",
+    "deepest_dust",
+    "deepest_expected",
+    "list_places",
+    "list_thrown",
+]
