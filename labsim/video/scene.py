@@ -1,0 +1,282 @@
+"""What a video shows besides the projectile: the background, its brightness in time, the noise, the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ..errors import MeasurementError
+from ..records import FloatArray, Measured
+from .frames import Frames
+
+LEAST_CONTRAST = 4.0  # times the noise; below, every method fails (Cheezum et al. 2001)
+SPARSE = 4096  # pixels that stand for the picture where brightness and noise are followed in time
+NOISE_FRAMES = 600
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variance of a pixel = read² + gain · level, in grey levels; both include quantisation."""
+
+    read_variance: float
+    gain: float
+
+    def variance(self, level: FloatArray) -> FloatArray:
+        return np.maximum(self.read_variance + self.gain * np.maximum(level, 0.0), 1.0 / 12.0)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The picture without the projectile. Arrays of shape (rows, columns) unless said otherwise.
+
+    background : grey level at brightness 1; projectile_level : grey level of the projectile;
+    trusted : pixels that are neither dead nor saturated; swept : pixels that the projectile passed over;
+    brightness : (n,) of each frame; duplicate : (n,) whether a frame repeats the one before, bit by bit;
+    surface : row of the dust's surface along a column x: rows = surface[0] + surface[1] · x, None where none is seen.
+    """
+
+    background: FloatArray
+    projectile_level: float
+    trusted: np.ndarray
+    swept: np.ndarray
+    brightness: FloatArray
+    duplicate: np.ndarray
+    noise: Noise
+    contrast: float
+    surface: tuple[float, float] | None
+    surface_sigma: float
+    ceiling: float
+
+    def surface_row(self, column: float) -> Measured | None:
+        if self.surface is None:
+            return None
+        return Measured(self.surface[0] + self.surface[1] * column, self.surface_sigma)
+
+
+def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | None = None) -> Scene:
+    """Two passes over the video: what moves, then the background behind it. Raises MeasurementError."""
+    path = frames.path
+    low = high = first = previous = None
+    brightness, sparse, duplicate = [], [], []
+    step = max(1, int(np.sqrt(frames.shape[0] * frames.shape[1] / SPARSE)))
+    for i, picture in enumerate(frames):
+        small = picture[::step, ::step].astype(np.float32)
+        if first is None:
+            first = small
+            lit = first > 0.5 * (np.percentile(first, 5) + np.percentile(first, 95))
+            if not np.any(lit):
+                lit = np.ones_like(first, bool)
+        level = float(np.median(small[lit] / np.maximum(first[lit], 1.0)))
+        duplicate.append(previous is not None and np.array_equal(picture, previous))
+        previous = picture
+        brightness.append(level if level > 0 else 1.0)
+        if len(sparse) < NOISE_FRAMES:
+            sparse.append(small / brightness[-1])
+        blurred = cv2.blur(picture, (3, 3)).astype(np.float32) / np.float32(brightness[-1])
+        low = blurred if low is None else np.minimum(low, blurred)
+        high = blurred if high is None else np.maximum(high, blurred)
+        if progress is not None:
+            progress(i + 1, frames.count, "looking for what moves")
+    if low is None or high is None or len(brightness) < 12:
+        raise MeasurementError(path, "video", f"only {len(brightness)} frames can be read; a drop needs at least 12")
+    brightness_array = np.array(brightness)
+    noise = _measure_noise(np.array(sparse))
+    span = high - low
+    floor = float(np.median(span))
+    threshold = max(_otsu(span), floor + 3.0)
+    moved = cv2.morphologyEx((span > threshold).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    typical = float(np.median(0.5 * (low + high)))
+    pixel_noise = float(np.sqrt(noise.variance(np.array(typical))))
+    if moved.sum() < 40:
+        raise MeasurementError(path, "video", "nothing moves through the picture; is the projectile in view?")
+    contrast = float(np.median(span[moved])) - floor
+    if contrast < LEAST_CONTRAST * pixel_noise:
+        raise MeasurementError(
+            path,
+            "video",
+            f"contrast {contrast:.1f} is below 4 times the noise {pixel_noise:.1f}: nothing can be tracked; use more light",
+        )
+    count, _, stats, _ = cv2.connectedComponentsWithStats(moved.astype(np.uint8), connectivity=8)
+    if count > 2:  # the projectile's path: one or two large pieces; specks of spray are small
+        areas = stats[1:, cv2.CC_STAT_AREA]
+        labels = cv2.connectedComponents(moved.astype(np.uint8), connectivity=8)[1]
+        moved = np.isin(labels, 1 + np.flatnonzero(areas >= 0.1 * areas.max()))
+    swept = cv2.dilate(moved.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    around = (cv2.dilate(swept.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0) & ~swept
+    middle = 0.5 * (low + high)
+    beside = middle[around] if np.any(around) else middle
+    dark = abs(np.median(beside) - np.median(high[moved])) < abs(np.median(beside) - np.median(low[moved]))
+    projectile_level = float(np.percentile(low[moved], 25) if dark else np.percentile(high[moved], 75))
+    # the extremes over many frames lie a few standard deviations out
+    projectile_level += (1 if dark else -1) * 0.6 * pixel_noise
+    background, seen = _average_background(frames, brightness_array, low, high, swept, dark)
+    ceiling = float((1 << frames.bits) - 1)
+    scene_level = np.where(seen, background, np.nan)
+    lit_level = float(np.nanmedian(scene_level[swept])) if np.any(seen & swept) else float(np.median(beside))
+    halfway = 0.5 * (lit_level + projectile_level)
+    is_lit = (background > halfway) if dark else (background < halfway)
+    surface, surface_sigma = _find_surface(background, is_lit & seen, swept, noise, len(brightness))
+    background = _fill_holes(background, is_lit & seen, swept, surface)
+    trusted = _find_trusted(np.array(sparse).shape, background, high, low, swept, ceiling)
+    return Scene(
+        background=background,
+        projectile_level=projectile_level,
+        trusted=trusted,
+        swept=swept,
+        brightness=brightness_array,
+        duplicate=np.array(duplicate),
+        noise=noise,
+        contrast=abs(lit_level - projectile_level),
+        surface=surface,
+        surface_sigma=surface_sigma,
+        ceiling=ceiling,
+    )
+
+
+def _otsu(values: FloatArray) -> float:
+    top = float(np.percentile(values, 99.9))
+    scaled = np.clip(values / max(top, 1e-6) * 255.0, 0, 255).astype(np.uint8)
+    return cv2.threshold(scaled, 0, 255, cv2.THRESH_OTSU)[0] / 255.0 * top
+
+
+def _measure_noise(sparse: FloatArray) -> Noise:
+    """Mean-variance line from the differences of neighbouring frames; medians, so that what moves does not count."""
+    n = len(sparse)
+    difference = np.diff(sparse, axis=0).reshape(n - 1, -1)
+    level = 0.5 * (sparse[1:] + sparse[:-1]).reshape(n - 1, -1)
+    still = ~np.all(difference == 0, axis=1)  # repeated frames say nothing
+    difference, level = difference[still], level[still]
+    if len(difference) < 4:
+        return Noise(1.0 / 12.0, 0.0)
+    # per pixel: clipped mean square, since medians of whole numbers are coarse
+    centre = np.median(difference, axis=0)
+    spread = np.maximum(1.4826 * np.median(np.abs(difference - centre), axis=0), 0.75)
+    inside = np.abs(difference - centre) < 4.0 * spread
+    square = np.sum(np.where(inside, (difference - centre) ** 2, 0.0), axis=0) / np.maximum(inside.sum(axis=0), 1)
+    variance = 0.5 * square
+    mean = np.median(level, axis=0)
+    edges = np.quantile(mean, np.linspace(0, 1, 13))
+    points = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        inside_bin = (mean >= a) & (mean <= b)
+        if inside_bin.sum() >= 20 and b > a:
+            points.append((np.mean(mean[inside_bin]), np.median(variance[inside_bin])))
+    if len(points) < 3 or np.ptp([p[0] for p in points]) < 5:
+        return Noise(max(float(np.median(variance)), 1.0 / 12.0), 0.0)
+    x, y = np.array(points).T
+    gain, read = np.polyfit(x, y, 1, w=1.0 / np.maximum(y, 1.0 / 12.0))
+    if gain < 0 or read < 0:
+        gain, read = (0.0, float(np.median(y))) if gain < 0 else (float(np.sum(x * y) / np.sum(x * x)), 1.0 / 12.0)
+    return Noise(float(max(read, 1.0 / 12.0)), float(gain))
+
+
+def _average_background(
+    frames: Frames, brightness: FloatArray, low: FloatArray, high: FloatArray, swept: np.ndarray, dark: bool
+) -> tuple[FloatArray, np.ndarray]:
+    """Mean of each pixel over the frames in which the projectile and its blurred edge are well away from it."""
+    every = max(1, len(brightness) // 300)
+    halfway = 0.5 * (low + high)
+    total = np.zeros(frames.shape, np.float64)
+    count = np.zeros(frames.shape, np.int32)
+    kernel = np.ones((9, 9), np.uint8)
+    for i, picture in enumerate(frames):
+        if i % every:
+            continue
+        level = picture.astype(np.float32) / np.float32(brightness[i])
+        blurred = cv2.blur(picture, (3, 3)).astype(np.float32) / np.float32(brightness[i])
+        covered = ((blurred < halfway) if dark else (blurred > halfway)) & swept
+        clear = cv2.dilate(covered.astype(np.uint8), kernel) == 0
+        total += np.where(clear, level, 0.0)
+        count += clear
+    seen = count > 0
+    return np.where(seen, total / np.maximum(count, 1), halfway), seen
+
+
+def _find_surface(
+    background: FloatArray, lit: np.ndarray, swept: np.ndarray, noise: Noise, count: int
+) -> tuple[tuple[float, float] | None, float]:
+    """Line through the half-way crossings from lit picture to dust beside the path; None where there is no dust."""
+    rows, columns = np.nonzero(swept)
+    bottom = lit[-3:].mean()
+    if bottom > 0.3:
+        return None, 0.0
+    left, right = columns.min(), columns.max()
+    radius = max(5, (right - left) // 4)
+    xs, ys = [], []
+    height = background.shape[0]
+    smooth = cv2.blur(background.astype(np.float32), (3, 1))
+    for x in range(background.shape[1]):
+        if left - radius // 2 < x < right + radius // 2:
+            continue
+        column = lit[:, x]
+        if not column.any() or column[-1]:
+            continue
+        edge = int(np.flatnonzero(column)[-1])
+        if edge < 12 or edge > height - 6:
+            continue
+        above = float(np.median(background[max(edge - 14, 0) : edge - 4, x]))
+        below = float(np.median(background[edge + 5 : edge + 15, x])) if edge + 8 < height else np.nan
+        if not np.isfinite(below):
+            continue
+        profile = (smooth[edge - 4 : edge + 6, x] - below) / (above - below)
+        fall = np.flatnonzero((profile[:-1] >= 0.5) & (profile[1:] < 0.5))
+        if fall.size == 0:
+            continue
+        k = int(fall[0])
+        xs.append(x)
+        ys.append(edge - 4 + k + (profile[k] - 0.5) / (profile[k] - profile[k + 1]))
+    if len(xs) < 12:
+        return None, 0.0
+    x, y = np.array(xs, float), np.array(ys)
+    keep = np.ones(len(x), bool)
+    for _ in range(4):
+        slope, offset = np.polyfit(x[keep], y[keep], 1)
+        misfit = y - slope * x - offset
+        keep = np.abs(misfit - np.median(misfit)) < 3.5 * max(1.4826 * np.median(np.abs(misfit)), 0.05)
+    roughness = float(np.std(misfit[keep]))
+    # neighbouring columns share the lumps of the surface: about one independent value per ten columns
+    sigma = max(roughness / np.sqrt(max(keep.sum() / 10.0, 1.0)), 0.02)
+    return (float(offset), float(slope)), sigma
+
+
+def _fill_holes(
+    background: FloatArray, lit: np.ndarray, swept: np.ndarray, surface: tuple[float, float] | None
+) -> FloatArray:
+    """Where the projectile always stood in the way, the smooth surface through the lit background takes its place."""
+    h, w = background.shape
+    y, x = np.mgrid[0:h, 0:w]
+    above = np.ones((h, w), bool) if surface is None else y < surface[0] + surface[1] * x - 4.0
+    columns = np.flatnonzero(swept.any(axis=0))
+    corridor = np.zeros((h, w), bool)
+    corridor[:, columns.min() : columns.max() + 1] = True
+    good = lit & above
+    holes = above & corridor & ~cv2.erode(good.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
+    if not holes.any() or (good & ~holes).sum() < 50:
+        return background
+    fit = good & ~holes
+    picks = np.flatnonzero(fit)[:: max(1, int(fit.sum() // 20000))]
+    u, v = (x / w * 2 - 1), (y / h * 2 - 1)
+    terms = [(i, j) for i in range(5) for j in range(5 - i)]
+    matrix = np.column_stack([u.flat[picks] ** i * v.flat[picks] ** j for i, j in terms])
+    target = background.flat[picks]
+    weights = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    spread = target - matrix @ weights
+    calm = np.abs(spread) < 3 * 1.4826 * np.median(np.abs(spread)) + 1e-6
+    weights = np.linalg.lstsq(matrix[calm], target[calm], rcond=None)[0]
+    smooth = np.zeros((h, w))
+    for (i, j), weight in zip(terms, weights, strict=True):
+        smooth += weight * u**i * v**j
+    return np.where(holes, smooth, background)
+
+
+def _find_trusted(
+    _: tuple[int, ...], background: FloatArray, high: FloatArray, low: FloatArray, swept: np.ndarray, ceiling: float
+) -> np.ndarray:
+    """Pixels that respond: not stuck far from their neighbours' background, not dead under a passing projectile."""
+    near = cv2.medianBlur(background.astype(np.float32), 5)
+    departure = np.abs(background - near)
+    spread = 1.4826 * float(np.median(departure)) + 1e-6
+    return departure < max(12.0 * spread, 0.15 * float(np.ptp(near)))
