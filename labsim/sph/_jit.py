@@ -1,4 +1,4 @@
-"""The one decorator of all compiled code, and a cache that cannot go stale.
+"""The decorators of all compiled code, and a cache that cannot go stale.
 
 Numba checks only the file of the cached function, not the files it calls into, so an edit of one kernel could leave
 another one with old code inside. The cache folder is therefore named by a hash of all solver sources.
@@ -36,7 +36,16 @@ FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
 def compiled(function: Callable) -> Callable:
-    """Compile a kernel: serial (one run a core), cached on disk, NaN kept visible."""
+    """Compile a kernel that other kernels call: serial (one run a core), NaN kept visible.
+
+    Inlined, never cached by itself: a kernel linked from a cache is optimised differently from one compiled afresh, and
+    the last bits of a run would depend on which of the two happened.
+    """
+    return numba.njit(inline="always", error_model="numpy", fastmath=FAST, boundscheck=False)(function)
+
+
+def compiled_entry(function: Callable) -> Callable:
+    """Compile a kernel that Python calls, with everything it calls, and keep the whole on disk."""
     return numba.njit(cache=True, error_model="numpy", fastmath=FAST, boundscheck=False)(function)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..records import FloatArray
 from . import particles as rows
-from ._jit import compiled
+from ._jit import compiled_entry
 from .gradients import carry_stress, deform, mirror_axis, renormalise
 from .materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths, update_stress
 from .neighbours import Neighbours
@@ -48,7 +48,7 @@ STEPS_AT_ONCE = 64
 ) = range(len(rows.ROWS))  # fmt: skip
 
 
-@compiled
+@compiled_entry
 def advance(
     s, n, axisymmetric, source, twice_plane, wall, start, neighbour, origin, allowed, steps, log, first,
     body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, wall_weight, contact_stiffness, friction,
@@ -222,7 +222,10 @@ def evolve(
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[0], -body[1]
     made, builds, stop_step, limit = 0, 0, None, setting.duration
+    farthest = 1000 * (np.abs(dust[[rows.X, rows.Z]]).max() + setting.spacing)
     while body[2] < limit:
+        if not np.abs(state[[rows.X, rows.Z], :n]).max() < farthest:
+            raise _blown_up(setting, made, body[2])
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
         if n + source.size > state.shape[1]:
             state = np.concatenate([state[:, :n], np.zeros((state.shape[0], source.size + 64))], axis=1)
@@ -247,11 +250,7 @@ def evolve(
                 setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():
-                raise SimulationError(
-                    "simulation",
-                    "run",
-                    f"blew up after {made + max(done, 0)} steps at {body[2] * 1e3:.4g} ms with {setting}",
-                )
+                raise _blown_up(setting, made + max(done, 0), body[2])
             made += done
             fresh = done == steps
             if body[1] >= 0.0 and stop_step is None:
@@ -290,6 +289,10 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
         setting, result.log, result.stop_step, result.at_stop, result.state,
         dust, wall, per_unit, result.rebuilds, time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _blown_up(setting: DropSetting, steps: int, reached: float) -> SimulationError:
+    return SimulationError("simulation", "run", f"blew up after {steps} steps at {reached * 1e3:.4g} ms with {setting}")
 
 
 def _find_images(x: FloatArray, near: float, mirrors: tuple[float, ...]) -> tuple[np.ndarray, FloatArray]:

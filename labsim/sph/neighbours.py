@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled_entry
 
 
-@compiled
+@compiled_entry
 def sort_into_cells(n, x, z, x0, z0, size, nx, nz, cell_start, order, cell_of):
     """Counting sort of n points into nx × nz square cells; ``order`` lists points cell by cell."""
     for c in range(nx * nz + 1):
@@ -30,7 +30,7 @@ def sort_into_cells(n, x, z, x0, z0, size, nx, nz, cell_start, order, cell_of):
         fill[c] += 1
 
 
-@compiled
+@compiled_entry
 def list_neighbours(n, x, z, reach, x0, z0, size, nx, nz, cell_start, order, start, out):
     """Neighbours within ``reach`` of particles 0..n-1 among all sorted points. Returns the length used (or needed)."""
     reach2 = reach * reach

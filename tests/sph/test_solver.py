@@ -1,0 +1,222 @@
+"""What every run promises: the same bytes again, momentum and energy that balance, clear refusals."""
+
+import hashlib
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from labsim.errors import SimulationError
+from labsim.records import Material, Projectile
+from labsim.sph import DropSetting, Numerics, _jit, check_setting, simulate
+
+RADIUS = 5e-4
+MASS = 2540 * 4 / 3 * math.pi * RADIUS**3
+BEAD = Projectile("hemisphere", RADIUS, MASS)
+CYLINDER = Projectile("cylinder", RADIUS, 2540 * math.pi * RADIUS**2)
+
+
+def a_drop(**changes):
+    values = {"projectile": BEAD, "impact_speed": 0.66, "material": Material(), "spacing": RADIUS / 5}
+    return DropSetting(**(values | changes))
+
+
+def digest(run):
+    parts = (run.time, run.depth, run.velocity, run.force, run.particles.filling_factor, run.particles.r)
+    return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def drop():
+    return simulate(a_drop())
+
+
+@pytest.fixture(scope="module")
+def planar_drop():
+    return simulate(a_drop(projectile=CYLINDER, geometry="planar"))
+
+
+def test_it_stops_and_says_how_deep(drop):
+    assert drop.stopped
+    assert 0.5e-3 < drop.penetration_depth < 0.9e-3
+    assert drop.velocity[0] == 0.66
+    assert np.max(drop.depth) == pytest.approx(drop.penetration_depth, rel=1e-3)
+    assert drop.warnings == ()
+
+
+def test_momentum(drop, planar_drop):
+    assert abs(drop.momentum_error) < 1e-12
+    assert abs(planar_drop.momentum_error) < 1e-12
+
+
+def test_energy_book(drop, planar_drop):
+    for run in (drop, planar_drop):
+        assert abs(run.energy_error) < 0.01
+        assert run.energies["plastic"] > 0.5 * run.energies["kinetic_at_contact"]
+        assert run.energies["viscous"] >= 0
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"material": Material(contact_friction=0.3)}, {"projectile": Projectile("sphere", RADIUS, MASS)}],
+)
+def test_books_with_friction_and_with_a_sphere(changes, drop):
+    run = simulate(a_drop(**changes))
+    assert abs(run.momentum_error) < 1e-12
+    assert abs(run.energy_error) < 0.01
+    if "material" in changes:
+        assert run.energies["friction"] > 0
+        assert run.penetration_depth < drop.penetration_depth
+
+
+def test_mass_ledger(drop):
+    """Every particle keeps its mass: Σ φ V ρs is what was filled in, and the dust lost in volume went into compaction."""
+    p = drop.particles
+    filled = 0.15 * np.sum(p.volume * p.filling_factor / p.initial_filling_factor)
+    assert np.sum(p.filling_factor * p.volume) == pytest.approx(filled, rel=1e-12)
+    lost = np.sum(p.volume * (p.filling_factor / p.initial_filling_factor - 1))
+    swept = math.pi * (RADIUS * drop.penetration_depth**2 - drop.penetration_depth**3 / 3)
+    if drop.penetration_depth > RADIUS:
+        swept = 2 / 3 * math.pi * RADIUS**3 + math.pi * RADIUS**2 * (drop.penetration_depth - RADIUS)
+    assert 0.8 * swept < lost < 2 * swept  # the surface around it sinks too
+
+
+def test_planar_run_is_symmetric(planar_drop):
+    p = planar_drop.particles
+    scale = 2 * np.max(np.abs(p.r))
+    here, there = (
+        np.lexsort((np.round(p.r, 7), np.round(p.z, 7))),
+        np.lexsort((np.round(-p.r, 7), np.round(p.z, 7))),
+    )
+    np.testing.assert_allclose(p.r[here], -p.r[there], atol=1e-10 * scale)
+    np.testing.assert_allclose(p.z[here], p.z[there], atol=1e-10 * scale)
+
+
+def test_the_same_bytes_again(drop):
+    assert digest(simulate(a_drop())) == digest(drop)
+
+
+@pytest.mark.parametrize("cache", ["cold", "warm", "two workers"])
+def test_the_same_bytes_from_another_process(drop, tmp_path_factory, cache):
+    folder = tmp_path_factory.getbasetemp() / "compiled"
+    program = (
+        "import sys; sys.path[:0] = " + repr(sys.path) + "\n"
+        "import importlib.util as u; s = u.spec_from_file_location('t', " + repr(__file__) + ")\n"
+        "t = u.module_from_spec(s); s.loader.exec_module(t); print(t.digest(t.simulate(t.a_drop())))"
+    )
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder)}
+    count = 2 if cache == "two workers" else 1
+    workers = [
+        subprocess.Popen([sys.executable, "-c", program], env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(count)
+    ]
+    for worker in workers:
+        out, _ = worker.communicate()
+        assert worker.returncode == 0
+        assert out.strip() == digest(drop)
+    assert any(folder.rglob("*.nbi"))
+
+
+def test_solver_hash_changes_with_a_source(tmp_path, monkeypatch):
+    (tmp_path / "materials").mkdir()
+    (tmp_path / "materials" / "law.py").write_text("a = 1\n")
+    monkeypatch.setattr(_jit, "_SOURCES", tmp_path)
+    before = _jit.hash_sources()
+    assert _jit.hash_sources() == before
+    (tmp_path / "materials" / "law.py").write_text("a = 2\n")
+    after = _jit.hash_sources()
+    assert after != before
+    (tmp_path / "materials" / "law.py").rename(tmp_path / "materials" / "other.py")
+    assert _jit.hash_sources() != after
+
+
+def test_import_to_first_step_is_quick(drop):
+    """With a warm cache, from the import to a drop of 100 µs: seconds of the process, not of a busy machine."""
+    program = (
+        "import sys; sys.path[:0] = " + repr(sys.path) + "\n"
+        "import time, importlib.util as u; s = u.spec_from_file_location('t', " + repr(__file__) + ")\n"
+        "import labsim\nfrom labsim.sph import DropSetting, simulate\nfrom labsim.records import Material, Projectile\n"
+        f"b = Projectile('hemisphere', {RADIUS}, {MASS})\n"
+        f"simulate(DropSetting(b, 0.66, Material(), spacing={RADIUS / 5}, duration=1e-6))\n"
+        "print(time.process_time())"
+    )
+    out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert float(out) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "says"),
+    [
+        ({"spacing": RADIUS / 3.9}, "spacing", "does not resolve"),
+        ({"spacing": 0.0}, "spacing", "positive"),
+        ({"impact_speed": 16.0}, "impact_speed", "sound speed"),
+        ({"impact_speed": math.nan}, "impact_speed", "positive"),
+        ({"filling_factor": 0.12}, "filling_factor", "(0.12, 0.58)"),
+        ({"filling_factor": 0.6}, "filling_factor", "(0.12, 0.58)"),
+        ({"crust_excess": 0.5}, "filling_factor", "0.65"),
+        ({"filling_gradient": -20.0}, "filling_factor", "lies outside"),
+        ({"material": Material(p_m=0.0)}, "material.p_m", "positive"),
+        ({"projectile": CYLINDER}, "projectile.tip", "planar"),
+        ({"projectile": Projectile("sphere", RADIUS, 0.0)}, "projectile", "positive"),
+    ],
+)
+def test_a_setting_that_cannot_be_simulated(changes, key, says):
+    with pytest.raises(SimulationError) as caught:
+        check_setting(a_drop(**changes))
+    assert caught.value.key == key
+    assert says in str(caught.value)
+
+
+def test_four_spacings_across_the_tip_will_do():
+    check_setting(a_drop(spacing=RADIUS / 4))
+
+
+def test_a_run_that_blows_up_names_its_parameters():
+    with pytest.raises(SimulationError, match=r"blew up after \d+ steps.*courant=5"):
+        simulate(a_drop(numerics=Numerics(courant=5.0)))
+
+
+def test_clamp_near_the_upper_limit_is_reported():
+    """A dust that hardly grows stronger is driven up to φ2: the run says so."""
+    weak = Material(p_m=2.0, phi_2=0.2, tensile_log10_a=-1.0, bulk_modulus=45e3)
+    run = simulate(a_drop(material=weak, duration=1e-3))
+    assert any("φ2" in warning and "%" in warning for warning in run.warnings)
+    assert any("did not stop" in warning for warning in run.warnings)
+
+
+@pytest.mark.parametrize(
+    "term", ["strength_rate", "crust_excess", "side_friction", "force_of_speed", "force_of_depth"]
+)
+def test_terms_of_the_catalogue_make_it_shallower(term, drop):
+    value = {
+        "strength_rate": 0.02,
+        "crust_excess": 0.05,
+        "side_friction": 2.0,
+        "force_of_speed": ((0.0, 0.0), (1.0, 2e-3)),
+        "force_of_depth": ((0.0, 0.0), (1e-3, 2e-3)),
+    }[term]
+    run = simulate(a_drop(**{term: value}))
+    assert run.penetration_depth < drop.penetration_depth * 0.998
+    assert abs(run.momentum_error) < 1e-12
+    assert abs(run.energy_error) < 0.015
+
+
+def test_trapped_gas_is_in_the_energy_book(drop):
+    """Which way trapped gas moves the depth is open (it stiffens the dust, and takes its shear strength away)."""
+    run = simulate(a_drop(pore_gas=2e4))
+    assert abs(run.penetration_depth / drop.penetration_depth - 1) > 0.01
+    assert abs(run.momentum_error) < 1e-12
+    print(run.energy_error)
+
+
+def test_strength_shape_of_one_changes_nothing(drop):
+    assert digest(simulate(a_drop(strength_shape=((0.1, 1.0), (0.5, 1.0))))) == digest(drop)
+
+
+def test_a_filling_factor_that_grows_with_depth(drop):
+    run = simulate(a_drop(filling_gradient=10.0))
+    assert run.penetration_depth < drop.penetration_depth
+    assert np.ptp(run.particles.initial_filling_factor) > 0.01

@@ -1,0 +1,172 @@
+"""Strengths, elastic moduli and the loading cycle of porous dust against hand-computed numbers (V1, V2)."""
+
+import numpy as np
+import pytest
+
+from labsim.records import Material
+from labsim.sph.materials import porous_dust as dust
+
+PHI = np.array([0.13, 0.15, 0.16, 0.18, 0.20, 0.22, 0.25, 0.30, 0.35, 0.40, 0.45, 0.50, 0.55])
+STRENGTH_OVER_P_M = np.array(
+    [0.006196, 0.028556, 0.043271, 0.079372, 0.124817, 0.18074, 0.28820, 0.55429, 1.0, 1.80411, 3.46979, 8.01168, 35.0188]
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("p_m", [260.0, 1300.0, 13000.0])
+def test_compressive_strength(p_m):
+    strength = dust.compressive_strength(PHI, Material(p_m=p_m))
+    np.testing.assert_allclose(strength, p_m * STRENGTH_OVER_P_M, rtol=1e-4)
+
+
+def test_compressive_strength_of_unidirectional_compression():
+    material = Material(p_m=5600.0, phi_1=0.15, phi_2=0.33, delta=0.33)
+    phi = [0.16, 0.18, 0.20, 0.22, 0.24, 0.26, 0.28, 0.30, 0.32]
+    expected = [650.5, 1648, 2709, 3972, 5600, 7895, 11575, 19024, 48211]
+    np.testing.assert_allclose(
+        dust.compressive_strength(phi, material), expected, rtol=0, atol=0.5
+    )  # as printed
+
+
+def test_tensile_strength():
+    phi = [0.10, 0.15, 0.20, 0.25, 0.30, 0.41, 0.54, 0.58]
+    expected = [-887.2, -1052.0, -1247.4, -1479.1, -1753.9, -2551.5, -3973.7, -4554.1]
+    np.testing.assert_allclose(dust.tensile_strength(phi, Material()), expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("p_m", "expected"),
+    [(1300.0, [197.6, 449.9, 744.4, 1124, 2405]), (260.0, [88.4, 201.2, 332.9, 502.8, 1075.5])],
+)
+def test_shear_strength(p_m, expected):
+    phi = [0.15, 0.20, 0.25, 0.30, 0.40]
+    np.testing.assert_allclose(dust.shear_strength(phi, Material(p_m=p_m)), expected, rtol=5e-4)
+
+
+def test_bulk_modulus_grows_with_the_fourth_power():
+    np.testing.assert_allclose(dust.bulk_modulus([0.15, 0.30], Material()), [45e3, 720e3])
+
+
+def test_table_is_the_formula_between_the_edges():
+    material = Material()
+    strength, tension = dust.tabulate_strengths(material)
+    phi = np.linspace(material.phi_1 + 0.01, material.phi_2 - 0.03, 4001)
+    grid = np.linspace(0.0, dust.TABLE_TOP, dust.TABLE_SIZE)
+    np.testing.assert_allclose(
+        np.interp(phi, grid, strength), dust.compressive_strength(phi, material), rtol=1e-5
+    )
+    np.testing.assert_allclose(
+        np.interp(phi, grid, tension), -dust.tensile_strength(phi, material), rtol=1e-6
+    )
+
+
+def test_strength_goes_on_without_a_jump_beyond_its_poles():
+    material = Material()
+    low, high = material.phi_1 + dust.EDGE, material.phi_2 - dust.EDGE
+    around = dust.compressive_strength([0.05, low, high - 1e-7, high, high + 1e-7, 0.62], material)
+    assert around[0] == around[1] > 0
+    assert np.all(np.diff(around[2:]) > 0)
+    below, above = np.diff(around[2:5])
+    assert above == pytest.approx(below, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("p_m", "modulus", "phi", "expected"),
+    [
+        (260.0, 4.5e3, 0.25, 0.24946),
+        (1300.0, 4.5e3, 0.20, 0.19764),
+        (1300.0, 4.5e3, 0.25, 0.24721),
+        (1300.0, 300e3, 0.25, 0.24996),
+        (13000.0, 300e3, 0.25, 0.24959),
+    ],
+)
+def test_zero_stress_filling_factor(p_m, modulus, phi, expected):
+    pressure = float(dust.compressive_strength(phi, Material(p_m=p_m)))
+    zero = dust.solve_zero_stress(phi, pressure, modulus, 4.0)
+    assert zero == pytest.approx(expected, abs=1.01e-5)
+    stiffness = modulus * (zero / 0.15) ** 4
+    assert stiffness * (phi / zero - 1) == pytest.approx(pressure, rel=1e-9)
+
+
+class OneParticle:
+    """A single lump of dust that is compressed isotropically, as rings of radius 1."""
+
+    def __init__(self, material, phi=0.15):
+        self.material = material
+        self.strength, self.tension = dust.tabulate_strengths(material)
+        self.row = {name: np.zeros(1) for name in "sxx szz sxz pressure sound work elastic".split()}
+        self.rho, self.zero, self.initial = np.array([2000.0 * phi]), np.array([phi]), np.array([phi])
+
+    def move(self, phi, steps, shear=0.0):
+        """Compress or expand to ``phi`` within 1 s; return the work per mass done meanwhile."""
+        rate = np.log(self.rho[0] / 2000.0 / phi) / 3
+        before = self.row["work"][0]
+        m, one = self.material, np.ones(1)
+        for _ in range(steps):
+            dust.update_stress(
+                1, 1.0 / steps, True, 2000.0, self.strength, self.tension, (dust.TABLE_SIZE - 1) / dust.TABLE_TOP,
+                m.bulk_modulus, m.bulk_exponent, m.shear_to_bulk, m.shear_factor, 0.0, 1.0, 0.0,
+                one, rate * one, rate * one, shear * one, shear * one, rate * one, self.rho, self.zero, self.initial,
+                self.row["sxx"], self.row["szz"], self.row["sxz"], self.row["pressure"], self.row["sound"],
+                self.row["work"], self.row["elastic"],
+            )  # fmt: skip
+        return self.row["work"][0] - before
+
+    @property
+    def pressure(self):
+        return self.row["pressure"][0]
+
+
+@pytest.mark.parametrize("modulus", [4.5e3, 45e3, 300e3])
+def test_loading_cycle(modulus):
+    """Load 0.15 → 0.25 on Σ, unload to p = 0 at φ0', reload elastically to Σ; the closed loop costs energy."""
+    material = Material(p_m=1300.0, bulk_modulus=modulus)
+    lump = OneParticle(material)
+    spent = lump.move(0.25, 4000)
+    strength = float(dust.compressive_strength(0.25, material))
+    assert lump.pressure == pytest.approx(strength, rel=1e-5)
+    zero = lump.zero[0]
+    held = lump.row["elastic"][0]
+    given_back = lump.move(zero, 400)
+    assert abs(lump.pressure) < 1e-9 * strength
+    assert lump.zero[0] == zero
+    assert -given_back == pytest.approx(held, rel=1e-4)
+    again = lump.move(0.25, 400)
+    assert lump.pressure == pytest.approx(strength, rel=1e-5)
+    assert again == pytest.approx(-given_back, rel=1e-4)
+    # the loss is what compaction along Σ costs: ∫ Σ dφ / (ρs φ²) less what is held elastically
+    phi = np.linspace(0.15, 0.25, 20001)
+    elastic_line = modulus * (phi / 0.15 - 1)
+    path = np.minimum(dust.compressive_strength(phi, material), elastic_line) / (2000.0 * phi**2)
+    assert spent == pytest.approx(np.trapezoid(path, phi), rel=1e-3)
+    assert spent + given_back > 0.5 * spent
+
+
+@pytest.mark.parametrize("modulus", [4.5e3, 300e3])
+def test_state_after_a_cycle_does_not_depend_on_the_steps(modulus):
+    ends = []
+    for steps in (1, 1000):
+        lump = OneParticle(Material(p_m=1300.0, bulk_modulus=modulus))
+        for phi in (0.25, 0.245, 0.26):
+            lump.move(phi, steps)
+        ends.append((lump.pressure, lump.zero[0]))
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-6)
+
+
+def test_tension_is_limited_and_moves_the_zero_stress_filling_factor():
+    material = Material(bulk_modulus=45e3)
+    lump = OneParticle(material)
+    lump.move(0.13, 1000)
+    assert lump.pressure == pytest.approx(float(dust.tensile_strength(0.13, material)), rel=1e-5)
+    assert lump.zero[0] < 0.15
+
+
+def test_shear_stops_at_the_shear_strength():
+    material = Material(bulk_modulus=45e3)
+    lump = OneParticle(material)
+    lump.move(0.15, 1000, shear=0.1)
+    q = np.sqrt(3) * abs(lump.row["sxz"][0])
+    assert q == pytest.approx(float(dust.shear_strength(0.15, material)), rel=1e-4)
+    sheared = OneParticle(material)
+    sheared.move(0.15, 1000, shear=1e-3)
+    # engineering shear 2·0.001 · 1 s: elastic as long as √3 μ γ < Y
+    assert sheared.row["sxz"][0] == pytest.approx(2 * 0.5 * 45e3 * 1e-3, rel=1e-6)
