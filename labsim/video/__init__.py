@@ -3,6 +3,28 @@
 from __future__ import annotations
 
 from .curve import check_drop_height, fit_deceleration
+from .formats.folder import read_picture
+from .frames import Frames, open_frames
+from .local import fit_local_polynomial
+from .overlay import draw_contact_sheet, write_overlay
+from .scale import measure_ruler, scale_from_diameter
 from .track_file import read_track, write_track
+from .tracker import Tracking, follow_projectile, track_projectile
 
-__all__ = ["check_drop_height", "fit_deceleration", "read_track", "write_track"]
+__all__ = [
+    "Frames",
+    "Tracking",
+    "check_drop_height",
+    "draw_contact_sheet",
+    "fit_deceleration",
+    "fit_local_polynomial",
+    "follow_projectile",
+    "measure_ruler",
+    "open_frames",
+    "read_picture",
+    "read_track",
+    "scale_from_diameter",
+    "track_projectile",
+    "write_overlay",
+    "write_track",
+]

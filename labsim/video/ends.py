@@ -59,7 +59,15 @@ def build_template(
         for view, spot in zip(views, spots, strict=True):
             start = spot if spot is not None else (view.y, view.x, scene.projectile_level, view.brightness)
             fit = register(
-                view.picture, scene.background, usable, template, scene.noise, start[0], start[1], start[2], start[3]
+                view.picture,
+                scene.background,
+                usable,
+                template,
+                scene.noise,
+                start[0],
+                start[1],
+                start[2],
+                start[3],
             )
             renewed.append(None if fit is None else (fit.y, fit.x, fit.level, fit.brightness))
         spots = renewed
@@ -164,15 +172,20 @@ def find_edge(template: Template) -> tuple[float, float, float, float, float] | 
     )
 
 
-def measure_tilt(template: Template) -> float | None:
-    """Tilt of the shaft against the columns (rad, positive to the right going down) from both side edges."""
+def measure_shaft(template: Template) -> tuple[float, float, float] | None:
+    """Tilt of the shaft against the columns (rad, positive to the right going down), its diameter and sigma (px).
+
+    From the half-way crossings of both side edges, row by row; None where the sides are not in the template.
+    """
     m = template.opacity[MARGIN:-MARGIN]
     solid = (m > 0.5).sum(axis=1)
-    rows = np.flatnonzero(solid > 0.8 * np.median(solid[solid > 0])) if np.any(solid > 0) else np.empty(0, int)
+    rows = (
+        np.flatnonzero(solid > 0.8 * np.median(solid[solid > 0])) if np.any(solid > 0) else np.empty(0, int)
+    )
     rows = rows[(rows > rows.min() + 3)] if rows.size else rows
     if rows.size < 12:
         return None
-    middle = []
+    middle, width = [], []
     for r in rows:
         line = m[r]
         inside = np.flatnonzero(line > 0.5)
@@ -182,7 +195,10 @@ def measure_tilt(template: Template) -> float | None:
         lo = i - (line[i] - 0.5) / (line[i] - line[i - 1])
         hi = j + (line[j] - 0.5) / (line[j] - line[j + 1])
         middle.append(0.5 * (lo + hi))
-    return float(np.arctan(np.polyfit(rows, middle, 1)[0]))
+        width.append(hi - lo)
+    tilt = float(np.arctan(np.polyfit(rows, middle, 1)[0]))
+    sigma = max(float(np.std(width)) / np.sqrt(len(width)), 0.02)
+    return tilt, float(np.mean(width)) * np.cos(tilt), sigma
 
 
 def fit_edge(
@@ -209,7 +225,9 @@ def fit_edge(
     image, ground, mask = picture[part].astype(float), background[part], usable[part].astype(float)
     yy = np.arange(r0, r1)[:, None] - slope * (np.arange(c0, c1 + 1)[None, :] - (x + 0.5 * (first + last)))
     q = np.array([centre, brightness, level])
-    weight = mask / np.where(image > 0.5 * (brightness * ground + level), noise_variance[0], noise_variance[1])
+    weight = mask / np.where(
+        image > 0.5 * (brightness * ground + level), noise_variance[0], noise_variance[1]
+    )
     for _ in range(8):
         s = (yy - q[0]) / blur
         m = 0.5 * (1 + erf(s / np.sqrt(2)))

@@ -55,7 +55,9 @@ class Frames:
         for picture in self.start():
             if picture.shape != self.shape:
                 raise MeasurementError(
-                    self.path, f"frame {seen}", f"is {picture.shape}, the first is {self.shape}; use one picture size"
+                    self.path,
+                    f"frame {seen}",
+                    f"is {picture.shape}, the first is {self.shape}; use one picture size",
                 )
             seen += 1
             if keep is not None:
@@ -72,7 +74,9 @@ class Frames:
         if degrees % 360 == 0:
             return self
         if degrees % 90:
-            raise MeasurementError(self.path, "--rotate", f"{degrees} is no multiple of 90; small angles are fitted")
+            raise MeasurementError(
+                self.path, "--rotate", f"{degrees} is no multiple of 90; small angles are fitted"
+            )
         turns = degrees // 90
         shape = self.shape[::-1] if turns % 2 else self.shape
         start = self.start

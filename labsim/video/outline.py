@@ -50,7 +50,9 @@ class Outliner:
 
     def find(self, picture: np.ndarray, brightness: float) -> Outline | None:
         """Outline of the largest dark body in the corridor; None where there is none."""
-        crop = cv2.blur(picture[:, self.left : self.right], (3, 3)).astype(np.float32) / np.float32(brightness)
+        crop = cv2.blur(picture[:, self.left : self.right], (3, 3)).astype(np.float32) / np.float32(
+            brightness
+        )
         away = self.background - crop
         covered = ((away if self.dark else -away) > self.half) & self.useful
         count, labels, stats, _ = cv2.connectedComponentsWithStats(covered.astype(np.uint8), connectivity=4)
@@ -78,7 +80,7 @@ class Outliner:
         column_top = centre(slice(int(solid[0]), int(solid[0]) + reach))
         column_tip = centre(slice(max(0, bh - reach), bh))
         # near the tip: does the body end by itself, with background under it?
-        under = int(round(column_tip)) - self.left
+        under = round(column_tip) - self.left
         floor = self.floor[np.clip(under, 0, len(self.floor) - 1)]
         visible_tip = tip_row < floor - 1
         lower = widths[max(0, bh - reach) :]

@@ -97,7 +97,9 @@ def register(
             dy, dx = dy - round(dy), dx - round(dx)
             region = None
         if region is None:
-            region = _cut(picture, background, usable, oy + template.top + MARGIN, ox + template.left + MARGIN, h, w)
+            region = _cut(
+                picture, background, usable, oy + template.top + MARGIN, ox + template.left + MARGIN, h, w
+            )
             if region is None:
                 return None
             image, ground, mask, rows, columns = region
@@ -139,7 +141,13 @@ def register(
         return None
     inverse = np.linalg.pinv(fisher / np.outer(scale, scale)) / np.outer(scale, scale)
     return Fit(
-        float(oy + dy), float(ox + dx), float(np.sqrt(max(inverse[0, 0], 0.0))), theta[2], theta[3], chi_square, lost
+        float(oy + dy),
+        float(ox + dx),
+        float(np.sqrt(max(inverse[0, 0], 0.0))),
+        theta[2],
+        theta[3],
+        chi_square,
+        lost,
     )
 
 
@@ -176,9 +184,9 @@ def sample_opacity(
     pad = 6
     rows = np.arange(oy + top - pad, oy + top + h + pad)
     columns = np.arange(ox + left - pad, ox + left + w + pad)
-    inside = (
-        ((rows >= 0) & (rows < picture.shape[0]))[:, None] & ((columns >= 0) & (columns < picture.shape[1]))[None, :]
-    )
+    inside = ((rows >= 0) & (rows < picture.shape[0]))[:, None] & (
+        (columns >= 0) & (columns < picture.shape[1])
+    )[None, :]
     r, c = np.clip(rows, 0, picture.shape[0] - 1), np.clip(columns, 0, picture.shape[1] - 1)
     image = picture[np.ix_(r, c)].astype(np.float64)
     ground = brightness * background[np.ix_(r, c)]
@@ -188,6 +196,8 @@ def sample_opacity(
     wide = Template(opacity, 0, 0)
     moved = wide.shifted(-sy, -sx)[0]  # content moved back so that the origin lies on a pixel
     spoiled = Template((~good).astype(float), 0, 0).shifted(-sy, -sx)[0]
-    weight = np.where(np.abs(spoiled) < 0.02, (lever**2 / noise.variance(image))[MARGIN:-MARGIN, MARGIN:-MARGIN], 0.0)
+    weight = np.where(
+        np.abs(spoiled) < 0.02, (lever**2 / noise.variance(image))[MARGIN:-MARGIN, MARGIN:-MARGIN], 0.0
+    )
     cut = pad - MARGIN
     return moved[cut:-cut, cut:-cut], weight[cut:-cut, cut:-cut]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -81,13 +82,17 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         if progress is not None:
             progress(i + 1, frames.count, "looking for what moves")
     if low is None or high is None or len(brightness) < 12:
-        raise MeasurementError(path, "video", f"only {len(brightness)} frames can be read; a drop needs at least 12")
+        raise MeasurementError(
+            path, "video", f"only {len(brightness)} frames can be read; a drop needs at least 12"
+        )
     brightness_array = np.array(brightness)
     noise = _measure_noise(np.array(sparse))
     span = high - low
     floor = float(np.median(span))
     threshold = max(_otsu(span), floor + 3.0)
-    moved = cv2.morphologyEx((span > threshold).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    moved = (
+        cv2.morphologyEx((span > threshold).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    )
     typical = float(np.median(0.5 * (low + high)))
     pixel_noise = float(np.sqrt(noise.variance(np.array(typical))))
     if moved.sum() < 40:
@@ -155,12 +160,14 @@ def _measure_noise(sparse: FloatArray) -> Noise:
     centre = np.median(difference, axis=0)
     spread = np.maximum(1.4826 * np.median(np.abs(difference - centre), axis=0), 0.75)
     inside = np.abs(difference - centre) < 4.0 * spread
-    square = np.sum(np.where(inside, (difference - centre) ** 2, 0.0), axis=0) / np.maximum(inside.sum(axis=0), 1)
+    square = np.sum(np.where(inside, (difference - centre) ** 2, 0.0), axis=0) / np.maximum(
+        inside.sum(axis=0), 1
+    )
     variance = 0.5 * square
     mean = np.median(level, axis=0)
     edges = np.quantile(mean, np.linspace(0, 1, 13))
     points = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         inside_bin = (mean >= a) & (mean <= b)
         if inside_bin.sum() >= 20 and b > a:
             points.append((np.mean(mean[inside_bin]), np.median(variance[inside_bin])))
@@ -169,7 +176,9 @@ def _measure_noise(sparse: FloatArray) -> Noise:
     x, y = np.array(points).T
     gain, read = np.polyfit(x, y, 1, w=1.0 / np.maximum(y, 1.0 / 12.0))
     if gain < 0 or read < 0:
-        gain, read = (0.0, float(np.median(y))) if gain < 0 else (float(np.sum(x * y) / np.sum(x * x)), 1.0 / 12.0)
+        gain, read = (
+            (0.0, float(np.median(y))) if gain < 0 else (float(np.sum(x * y) / np.sum(x * x)), 1.0 / 12.0)
+        )
     return Noise(float(max(read, 1.0 / 12.0)), float(gain))
 
 
@@ -199,7 +208,7 @@ def _find_surface(
     background: FloatArray, lit: np.ndarray, swept: np.ndarray, noise: Noise, count: int
 ) -> tuple[tuple[float, float] | None, float]:
     """Line through the half-way crossings from lit picture to dust beside the path; None where there is no dust."""
-    rows, columns = np.nonzero(swept)
+    _rows, columns = np.nonzero(swept)
     bottom = lit[-3:].mean()
     if bottom > 0.3:
         return None, 0.0
@@ -273,7 +282,12 @@ def _fill_holes(
 
 
 def _find_trusted(
-    _: tuple[int, ...], background: FloatArray, high: FloatArray, low: FloatArray, swept: np.ndarray, ceiling: float
+    _: tuple[int, ...],
+    background: FloatArray,
+    high: FloatArray,
+    low: FloatArray,
+    swept: np.ndarray,
+    ceiling: float,
 ) -> np.ndarray:
     """Pixels that respond: not stuck far from their neighbours' background, not dead under a passing projectile."""
     near = cv2.medianBlur(background.astype(np.float32), 5)

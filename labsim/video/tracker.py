@@ -7,13 +7,13 @@ seen their distance, the length of the rigid rod, is measured, and the top end t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured, Track
-from .ends import View, build_template, find_edge, find_tip_point, fit_edge, measure_tilt
+from .ends import View, build_template, find_edge, find_tip_point, fit_edge, measure_shaft
 from .frames import Frames
 from .outline import Outline, Outliner, choose_spread
 from .registration import MARGIN, Template, register
@@ -38,7 +38,7 @@ class EndTrack:
 class Tracking:
     """Everything that one video said. Lengths in px, angles in rad.
 
-    x : (n,) column of the tip; top_row : (n,) row of the top end, NaN where out of view; length : of the rod;
+    x : (n,) column of the tip; top_row : (n,) row of the top end, NaN where out of view; length, diameter : of the rod;
     surface : row of the dust's surface under the projectile; edge_difference : rms between the registration and the
     independent erf edge.
     """
@@ -47,7 +47,7 @@ class Tracking:
     x: FloatArray
     top_row: FloatArray
     length: Measured | None
-    width: float
+    diameter: Measured | None
     tip_radius: float | None
     surface: Measured | None
     tilt: float | None
@@ -57,14 +57,22 @@ class Tracking:
 
 
 def track_projectile(
-    frames: Frames, *, frame_rate: float | None = None, surface_row: float | None = None, progress: Progress | None = None
+    frames: Frames,
+    *,
+    frame_rate: float | None = None,
+    surface_row: float | None = None,
+    progress: Progress | None = None,
 ) -> Track:
     """Track of the tip; see ``follow_projectile`` for everything else that the video says."""
     return follow_projectile(frames, frame_rate=frame_rate, surface_row=surface_row, progress=progress).track
 
 
 def follow_projectile(
-    frames: Frames, *, frame_rate: float | None = None, surface_row: float | None = None, progress: Progress | None = None
+    frames: Frames,
+    *,
+    frame_rate: float | None = None,
+    surface_row: float | None = None,
+    progress: Progress | None = None,
 ) -> Tracking:
     """Follow the projectile through a video.
 
@@ -84,7 +92,9 @@ def follow_projectile(
     tip = _follow_end(frames, scene, usable, outlines, "tip", progress)
     if tip is None:
         raise MeasurementError(
-            frames.path, "video", "the tip is never seen free of the dust and the picture's edge; frame it wider"
+            frames.path,
+            "video",
+            "the tip is never seen free of the dust and the picture's edge; frame it wider",
         )
     round_end = find_tip_point(tip.template)
     if round_end is None:
@@ -93,15 +103,19 @@ def follow_projectile(
         tip_offset, tip_radius = float(rows[-1]) + 0.5 + tip.template.top, None
     else:
         tip_offset, tip_radius = round_end[0] + round_end[2], round_end[2]
-    width = outlines[1]
+    first_sigma = tip.sigma
+    tip = replace(tip, sigma=_raise_to_scatter(tip.y, tip.sigma, "the tip", warnings))
     tip_y, tip_x = tip.y + tip_offset, tip.x
     tip_sigma = tip.sigma.copy()
     row, sigma, x = tip_y.copy(), tip_sigma.copy(), tip_x.copy()
     reason = list(tip.reason)
     top_row = np.full(count, np.nan)
-    length = edge_rms = tilt = None
+    length = edge_rms = tilt = diameter = None
     if top is not None:
-        tilt = measure_tilt(top.template)
+        top = replace(top, sigma=_raise_to_scatter(top.y, top.sigma, "the top end", warnings))
+        shaft = measure_shaft(top.template)
+        if shaft is not None:
+            tilt, diameter = shaft[0], Measured(shaft[1], shaft[2])
         edge = find_edge(top.template)
         end = find_tip_point(top.template, lower=False) if edge is None else None
         offset = edge[0] if edge is not None else (end[0] - end[2] if end is not None else 0.0)
@@ -116,25 +130,43 @@ def follow_projectile(
             scatter = float(np.std(gap)) if len(gap) > 2 else 0.0
             length = Measured(reach - offset, doubt)
             if scatter > max(0.03, 3 * float(np.sqrt(np.median(variance)))):
-                warnings.append(f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane?")
+                warnings.append(
+                    f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane?"
+                )
             side = float(np.median((tip_x - top.x)[both]))
+            entering = _follow_entering(frames, scene, usable, tip, top, reach - tip_offset, side)
+            tip_y = np.where(np.isfinite(entering.y), entering.y + tip_offset, tip_y)
+            tip_x = np.where(np.isfinite(entering.y), entering.x, tip_x)
+            ratio = float(np.nanmedian(tip.sigma / first_sigma))
+            tip_sigma = np.where(np.isfinite(entering.y), entering.sigma * ratio, tip_sigma)
             row, sigma, x, reason = _join(top, tip_y, tip_x, tip_sigma, tip.reason, reach, side, doubt)
         else:
-            warnings.append("tip and top end are never seen together: frames with a buried tip have no position")
-            reason = [r or ("" if np.isfinite(v) else "tip in the dust") for r, v in zip(reason, row, strict=True)]
+            warnings.append(
+                "tip and top end are never seen together: frames with a buried tip have no position"
+            )
+            reason = [
+                r or ("" if np.isfinite(v) else "tip in the dust") for r, v in zip(reason, row, strict=True)
+            ]
         if edge is not None:
-            edge_rms = _compare_with_edge(frames, scene, usable, top, edge, row, sigma, reason, warnings, progress)
+            edge_rms = _compare_with_edge(
+                frames, scene, usable, top, edge, row, sigma, reason, warnings, progress
+            )
     else:
         warnings.append("the top end is never in view: only frames with a free tip have a position")
     reason = [("repeats the frame before" if d else r) for r, d in zip(reason, scene.duplicate, strict=True)]
     if scene.duplicate.any():
-        warnings.append(f"{int(scene.duplicate.sum())} frames repeat the one before (first: {int(np.argmax(scene.duplicate))})")
+        warnings.append(
+            f"{int(scene.duplicate.sum())} frames repeat the one before (first: {int(np.argmax(scene.duplicate))})"
+        )
     valid = np.isfinite(row) & np.array([r == "" for r in reason])
     if valid.sum() < 8:
         common = max(set(r for r in reason if r), key=reason.count, default="unknown")
-        raise MeasurementError(frames.path, "video", f"only {int(valid.sum())} frames can be tracked ({common})")
-    row, rotation = _straighten(row, x, valid, surface_row if surface_row is not None else surface, frames, warnings)
-    sigma = _raise_to_scatter(row, sigma, valid, warnings)
+        raise MeasurementError(
+            frames.path, "video", f"only {int(valid.sum())} frames can be tracked ({common})"
+        )
+    row, rotation = _straighten(
+        row, x, valid, surface_row if surface_row is not None else surface, frames, warnings
+    )
     rejected = int(np.sum(~valid))
     if rejected:
         kinds = {r: reason.count(r) for r in reason if r}
@@ -151,9 +183,7 @@ def follow_projectile(
     )
     if surface is not None:
         surface = scene.surface_row(float(np.nanmedian(x)))
-    return Tracking(
-        track, x, top_row, length, width, tip_radius, surface, tilt, rotation, edge_rms, scene
-    )
+    return Tracking(track, x, top_row, length, diameter, tip_radius, surface, tilt, rotation, edge_rms, scene)
 
 
 def time_frames(frames: Frames, count: int, frame_rate: float | None) -> FloatArray:
@@ -207,18 +237,29 @@ def _check_direction(frames: Frames, outlines: tuple[list[Outline | None], float
             i, y, x = np.array(spots).T
             if np.ptp(y) > 3 or np.ptp(x) > 3:
                 early = i <= i[0] + 0.5 * np.ptp(i)
-                steps.append((np.polyfit(i[early], y[early], 1)[0], np.polyfit(i[early], x[early], 1)[0], np.ptp(y), np.ptp(x)))
+                steps.append(
+                    (
+                        np.polyfit(i[early], y[early], 1)[0],
+                        np.polyfit(i[early], x[early], 1)[0],
+                        np.ptp(y),
+                        np.ptp(x),
+                    )
+                )
     if not steps:
         return
     dy, dx, range_y, range_x = max(steps, key=lambda s: s[2] + s[3])
     if range_x > 1.5 * range_y:
         turn = 270 if dx > 0 else 90
         raise MeasurementError(
-            frames.path, "video", f"the projectile moves sideways; give --rotate {turn} if the camera stood on its side"
+            frames.path,
+            "video",
+            f"the projectile moves sideways; give --rotate {turn} if the camera stood on its side",
         )
     if dy < 0:
         raise MeasurementError(
-            frames.path, "video", "the projectile moves upwards; give --rotate 180 if the picture is upside down"
+            frames.path,
+            "video",
+            "the projectile moves upwards; give --rotate 180 if the picture is upside down",
         )
 
 
@@ -239,7 +280,7 @@ def _follow_end(
         depth = int(np.clip(1.5 * width, 20, 60))
         top, bottom, half = -14, depth, 0.5 * width + 12
     else:
-        depth = int(np.clip(0.75 * tip_width + 4, 14, 90))
+        depth = int(np.clip(0.95 * tip_width + 4, 14, 90))
         top, bottom, half = -depth, 13, 0.5 * max(tip_width, width) + 12
     left = -int(np.ceil(half))
     shape = (bottom - top + 2 * MARGIN, 2 * int(np.ceil(half)) + 1 + 2 * MARGIN)
@@ -326,6 +367,40 @@ def _register_all(
     return EndTrack(rows, columns, sigma * max(1.0, np.sqrt(typical)), reason, template)
 
 
+def _follow_entering(
+    frames: Frames, scene: Scene, usable: np.ndarray, tip: EndTrack, top: EndTrack, reach: float, side: float
+) -> EndTrack:
+    """The part of the round end that still stands above the dust, in frames whose tip is buried; started from the top.
+
+    Kept only where it agrees with the top end: dust that is pushed up beside the projectile must not pull it.
+    """
+    wanted = np.isnan(tip.y) & np.isfinite(top.y) & ~scene.duplicate
+    empty = np.full(len(tip.y), np.nan)
+    entering = EndTrack(empty.copy(), empty.copy(), empty.copy(), [""] * len(tip.y), tip.template)
+    if not wanted.any():
+        return entering
+    usual = float(np.nanmedian(tip.sigma))
+    for i, picture in enumerate(frames):
+        if not wanted[i]:
+            continue
+        fit = register(
+            picture,
+            scene.background,
+            usable,
+            tip.template,
+            scene.noise,
+            float(top.y[i] + reach),
+            float(top.x[i] + side),
+            level=scene.projectile_level * float(scene.brightness[i]),
+            brightness=float(scene.brightness[i]),
+        )
+        if fit is None or not fit.sigma < 8 * usual or fit.lost > 0.2:
+            continue
+        if abs(fit.y - top.y[i] - reach) < 4 * np.hypot(fit.sigma, top.sigma[i]) + 0.02:
+            entering.y[i], entering.x[i], entering.sigma[i] = fit.y, fit.x, fit.sigma
+    return entering
+
+
 def _clip_gap(gap: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Leave out distances between the ends that lie far from the others."""
     spread = max(1.4826 * float(np.median(np.abs(gap - np.median(gap)))), 0.005)
@@ -406,7 +481,9 @@ def _compare_with_edge(
         reason[i] = "registration and edge disagree"
     rms = float(np.sqrt(np.mean(difference[known & ~wrong] ** 2)))
     if spread > 3 * float(np.nanmedian(error)) and spread > 0.02:
-        warnings.append(f"registration and erf edge differ by {spread:.3f} px, more than their error bars allow")
+        warnings.append(
+            f"registration and erf edge differ by {spread:.3f} px, more than their error bars allow"
+        )
     return rms
 
 
@@ -422,7 +499,13 @@ def _straighten(
     good = valid & np.isfinite(x)
     if good.sum() < 8 or np.ptp(row[good]) < 10:
         return row, None
-    y0 = surface.value if isinstance(surface, Measured) else surface if surface is not None else float(np.mean(row[good]))
+    y0 = (
+        surface.value
+        if isinstance(surface, Measured)
+        else surface
+        if surface is not None
+        else float(np.mean(row[good]))
+    )
     keep = good.copy()
     for _ in range(3):
         slope, offset = np.polyfit(row[keep], x[keep], 1)
@@ -435,9 +518,9 @@ def _straighten(
     return y0 + (row - y0) * np.hypot(1.0, slope), Measured(angle, spread)
 
 
-def _raise_to_scatter(row: FloatArray, sigma: FloatArray, valid: np.ndarray, warnings: list[str]) -> FloatArray:
-    """Raise the error bars where the rows scatter about their neighbours by more than the error bars say."""
-    index = np.flatnonzero(valid)
+def _raise_to_scatter(row: FloatArray, sigma: FloatArray, what: str, warnings: list[str]) -> FloatArray:
+    """Raise the error bars of one end where it scatters about its neighbours by more than the error bars say."""
+    index = np.flatnonzero(np.isfinite(row))
     if len(index) < 20:
         return sigma
     ratios = []
@@ -453,6 +536,8 @@ def _raise_to_scatter(row: FloatArray, sigma: FloatArray, valid: np.ndarray, war
     factor = 1.4826 * float(np.median(np.abs(ratios)))
     if factor > 1.15:
         if factor > 1.6:
-            warnings.append(f"rows scatter {factor:.1f} times more than the noise explains: error bars were raised")
+            warnings.append(
+                f"{what} scatters {factor:.1f} times more than the noise explains: its error bars were raised"
+            )
         return sigma * factor
     return sigma

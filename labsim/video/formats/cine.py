@@ -39,18 +39,26 @@ def _open_file(path: Path) -> Frames:
         if mark != b"CI":
             raise MeasurementError(path, "video", "is no .cine file (its first bytes are not CI)")
         if compression != 0:
-            raise MeasurementError(path, "video", f"compression {compression} is not read; save it as uncompressed grey")
+            raise MeasurementError(
+                path, "video", f"compression {compression} is not read; save it as uncompressed grey"
+            )
         count, image_at, setup_at, table_at = struct.unpack_from("<IIII", head, 20)
         if not (0 < count <= size // 8 and max(image_at, setup_at, table_at) < size):
-            raise MeasurementError(path, "video", f"is truncated or damaged (says {count} frames in {size} bytes)")
+            raise MeasurementError(
+                path, "video", f"is truncated or damaged (says {count} frames in {size} bytes)"
+            )
         file.seek(image_at)
         _, width, height, _, depth, packing, image_size = struct.unpack("<IiiHHII", file.read(24))
         if depth not in (8, 16) or packing != 0:
             raise MeasurementError(
-                path, "video", f"stores {depth} bit, packing {packing}; save it as uncompressed 8 or 16 bit grey"
+                path,
+                "video",
+                f"stores {depth} bit, packing {packing}; save it as uncompressed 8 or 16 bit grey",
             )
         if not (0 < width <= 1 << 15 and 0 < height <= 1 << 15) or width * height * depth // 8 != image_size:
-            raise MeasurementError(path, "video", f"has pictures of {width} × {height} in {image_size} bytes: damaged")
+            raise MeasurementError(
+                path, "video", f"has pictures of {width} × {height} in {image_size} bytes: damaged"
+            )
         file.seek(setup_at)
         setup = file.read(min(max(table_at - setup_at, 0), 1 << 16))
         if setup[140:142] != b"ST":
@@ -94,7 +102,8 @@ def _open_file(path: Path) -> Frames:
         exposure=exposure,
         header_rate=header_rate,
         codec="cine",
-        warnings=warnings + ([f"truncated: pictures of {inside} of {count} frames are there"] if inside < count else []),
+        warnings=warnings
+        + ([f"truncated: pictures of {inside} of {count} frames are there"] if inside < count else []),
     )
 
 

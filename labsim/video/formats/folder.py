@@ -43,7 +43,9 @@ def open_file(path: Path) -> Frames:
     files = [files[i] for i in order]
     gaps = np.diff(index) - 1
     if np.any(gaps > 0):
-        warnings.append(f"{int(gaps.sum())} frames dropped (gaps in the file numbers, first after {files[int(np.argmax(gaps > 0))].name})")
+        warnings.append(
+            f"{int(gaps.sum())} frames dropped (gaps in the file numbers, first after {files[int(np.argmax(gaps > 0))].name})"
+        )
     first = read_picture(files[0])
     return Frames(
         path=path,

@@ -15,8 +15,36 @@ from ..frames import Frames
 
 NAME = "AVI, MP4, MOV, MKV (8 bit)"
 SUFFIXES = {".avi", ".mp4", ".mov", ".mkv", ".m4v"}
-LOSSLESS = {"ffv1", "hfyu", "ffvh", "dib ", "y800", "grey", "raw ", "\0\0\0\0", "png ", "mpng", "bgr\0", "iyuv"}
-BETWEEN = {"xvid", "mp4v", "divx", "h264", "avc1", "x264", "hevc", "hev1", "hvc1", "fmp4", "mpg4", "mp42", "vp80", "vp90"}
+LOSSLESS = {
+    "ffv1",
+    "hfyu",
+    "ffvh",
+    "dib ",
+    "y800",
+    "grey",
+    "raw ",
+    "\0\0\0\0",
+    "png ",
+    "mpng",
+    "bgr\0",
+    "iyuv",
+}
+BETWEEN = {
+    "xvid",
+    "mp4v",
+    "divx",
+    "h264",
+    "avc1",
+    "x264",
+    "hevc",
+    "hev1",
+    "hvc1",
+    "fmp4",
+    "mpg4",
+    "mp42",
+    "vp80",
+    "vp90",
+}
 
 
 def recognises(path: Path) -> bool:
@@ -32,7 +60,9 @@ def open_file(path: Path) -> Frames:
     ok, picture = video.read()
     video.release()
     if not ok or picture is None:
-        raise MeasurementError(path, "video", f"no frame can be read (codec {codec!r}); export it as FFV1 or MJPEG AVI")
+        raise MeasurementError(
+            path, "video", f"no frame can be read (codec {codec!r}); export it as FFV1 or MJPEG AVI"
+        )
     if picture.dtype != np.uint8:
         raise MeasurementError(path, "video", "holds more than 8 bit; export it as 16-bit TIFF or .cine")
     if count < 1 or count > 10_000_000:
@@ -40,11 +70,15 @@ def open_file(path: Path) -> Frames:
     warnings = []
     lossy = codec not in LOSSLESS
     if codec in BETWEEN:
-        warnings.append(f"{codec.upper()} stores differences between frames: error bars may be too small; record MJPEG or raw")
+        warnings.append(
+            f"{codec.upper()} stores differences between frames: error bars may be too small; record MJPEG or raw"
+        )
     elif codec == "mjpg":
         quality = _estimate_quality(path)
         if quality is not None and quality < 60:
-            warnings.append(f"MJPEG quality about {quality}: compression costs accuracy; record at 90 or above")
+            warnings.append(
+                f"MJPEG quality about {quality}: compression costs accuracy; record at 90 or above"
+            )
     shades = picture.reshape(-1, picture.shape[-1]).astype(np.int16) if picture.ndim == 3 else None
     if shades is not None and np.mean(np.ptp(shades, axis=1)) > 6:
         warnings.append("colour video: turned into grey")
@@ -77,7 +111,9 @@ def _open(path: Path) -> cv2.VideoCapture:
     except cv2.error as trouble:
         raise MeasurementError(path, "video", f"cannot be opened ({trouble.err})") from None
     if not video.isOpened():
-        raise MeasurementError(path, "video", "is no video that can be decoded; export it as FFV1 or MJPEG AVI")
+        raise MeasurementError(
+            path, "video", "is no video that can be decoded; export it as FFV1 or MJPEG AVI"
+        )
     return video
 
 
@@ -117,4 +153,4 @@ def _estimate_quality(path: Path) -> int | None:
     table = np.frombuffer(head, np.uint8, 64, at + 5).astype(float)
     standard = 3685.0  # sum of the 64 luminance steps of annex K
     scale = 100.0 * table.sum() / standard
-    return int(round(5000.0 / scale if scale > 100 else (200.0 - scale) / 2))
+    return round(5000.0 / scale if scale > 100 else (200.0 - scale) / 2)

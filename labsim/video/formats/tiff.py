@@ -26,7 +26,9 @@ def open_file(path: Path) -> Frames:
     except MeasurementError:
         raise
     except Exception as trouble:  # tifffile raises many kinds on damaged files
-        raise MeasurementError(path, "video", f"is no TIFF that can be read ({_first_line(trouble)})") from None
+        raise MeasurementError(
+            path, "video", f"is no TIFF that can be read ({_first_line(trouble)})"
+        ) from None
     return Frames(
         path=path,
         start=lambda: _read(path),
@@ -59,7 +61,9 @@ def make_grey(picture: np.ndarray, path: Path) -> np.ndarray:
     if picture.dtype == np.bool_:
         picture = picture.astype(np.uint8) * 255
     if picture.dtype not in (np.uint8, np.uint16):
-        raise MeasurementError(path, "video", f"has pixels of type {picture.dtype}; export 8- or 16-bit whole numbers")
+        raise MeasurementError(
+            path, "video", f"has pixels of type {picture.dtype}; export 8- or 16-bit whole numbers"
+        )
     return picture
 
 

@@ -1,0 +1,86 @@
+"""The track drawn on the frames, for a look: an MP4 and a contact sheet of six frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..errors import MeasurementError
+from ..records import Track
+from .frames import Frames
+
+GREEN, RED, BLUE, YELLOW = (80, 220, 60), (60, 60, 230), (230, 150, 40), (40, 210, 240)  # blue, green, red
+LONGEST_MOVIE = 1500
+
+
+def write_overlay(
+    frames: Frames, track: Track, column: np.ndarray, surface_row: float | None, path: Path
+) -> Path:
+    """Write the frames with tip and surface as an MP4 (slow motion, 15 pictures a second). Raises MeasurementError."""
+    every = max(1, len(track.frame) // LONGEST_MOVIE)
+    zoom = _zoom(frames.shape)
+    size = (frames.shape[1] * zoom // 2 * 2, frames.shape[0] * zoom // 2 * 2)
+    movie = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 15.0, size)
+    if not movie.isOpened():
+        raise MeasurementError(path, "overlay", "cannot be written: OpenCV has no MP4 encoder here")
+    for i, picture in _draw(frames, track, column, surface_row, zoom):
+        if i % every == 0:
+            movie.write(np.ascontiguousarray(picture[: size[1], : size[0]]))
+    movie.release()
+    return path
+
+
+def draw_contact_sheet(
+    frames: Frames, track: Track, column: np.ndarray, surface_row: float | None, moments: list[int]
+) -> list[np.ndarray]:
+    """The frames at ``moments`` (indices) with the track on them, (rows, columns, 3) uint8 RGB each."""
+    wanted = set(moments)
+    drawn = {}
+    for i, picture in _draw(frames, track, column, surface_row, _zoom(frames.shape), wanted):
+        drawn[i] = picture[..., ::-1].copy()
+    return [drawn[i] for i in moments if i in drawn]
+
+
+def _zoom(shape: tuple[int, int]) -> int:
+    return max(1, min(3, 700 // max(shape)))
+
+
+def _draw(
+    frames: Frames,
+    track: Track,
+    column: np.ndarray,
+    surface_row: float | None,
+    zoom: int,
+    wanted: set[int] | None = None,
+) -> Iterator[tuple[int, np.ndarray]]:
+    top = None
+    middle = float(np.nanmedian(column)) if np.isfinite(column).any() else frames.shape[1] / 2
+    for i, picture in enumerate(frames):
+        if i >= len(track.frame):
+            return
+        if wanted is not None and i not in wanted:
+            continue
+        if top is None:
+            top = max(float(np.percentile(picture, 99.5)), 1.0)
+        grey = np.clip(picture.astype(np.float32) * (235.0 / top), 0, 255).astype(np.uint8)
+        large = cv2.resize(grey, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_NEAREST)
+        image = cv2.cvtColor(large, cv2.COLOR_GRAY2BGR)
+
+        def at(value: float) -> int:
+            return round((value + 0.5) * zoom)
+
+        if surface_row is not None:
+            cv2.line(image, (0, at(surface_row)), (image.shape[1], at(surface_row)), BLUE, 1)
+        if track.valid[i]:
+            x, y = at(float(column[i])) if np.isfinite(column[i]) else at(middle), at(float(track.tip_row[i]))
+            cv2.line(image, (x - 12 * zoom, y), (x + 12 * zoom, y), GREEN, 1)
+            cv2.line(image, (x, y - 6 * zoom), (x, y + 6 * zoom), GREEN, 1)
+            label, colour = f"{int(track.frame[i])}", GREEN
+        else:
+            label, colour = f"{int(track.frame[i])} rejected", RED
+        cv2.putText(image, label, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 3, cv2.LINE_AA)
+        cv2.putText(image, label, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
+        yield i, image
