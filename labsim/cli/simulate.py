@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +11,16 @@ from typing import Annotated
 import typer
 
 from ..campaign import MATERIAL_KEYS, read_campaign
+from ..effects import (
+    Effect,
+    Model,
+    apply_effects,
+    check_model,
+    list_effects,
+    list_places,
+    read_model,
+    reference_campaign,
+)
 from ..errors import CampaignError, LabsimError
 from ..inference.convergence import extrapolate, refine
 from ..inference.planar import planar_setting
@@ -17,7 +28,7 @@ from ..inference.runs import RunStore, require_runs, write_run_file
 from ..inference.summary import impact_speed
 from ..records import Campaign, Drop, Material, Projectile
 from ..sph import DropRun, DropSetting, check_setting
-from ..tables import Document, Table
+from ..tables import Table
 from . import options
 
 GLASS = 2540.0  # kg/m^3, of the default bead
@@ -60,7 +71,8 @@ def simulate(
         typer.Option("--set", help="material.KEY=VALUE, any key of [material] in campaign.toml; repeatable."),
     ] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", help="model.toml: p_m_Pa and material to use.")
+        Path | None,
+        typer.Option("--model", help="model.toml as labsim diagnose writes it: p_m, material and effects."),
     ] = None,
     spacing_um: Annotated[
         float | None,
@@ -87,8 +99,10 @@ def simulate(
     read = read_campaign(campaign) if campaign is not None else None
     chosen = _choose_drop(read, drop)
     material, phi, density, gravity = _dust(read)
-    if model is not None:
-        material = _read_model(model, material)
+    known = list_effects(read)
+    extended = read_model(model, known) if model is not None else None
+    if extended is not None:
+        material = material.replace(p_m=extended.p_m, **dict(extended.material))
     if p_m_pa is not None:
         material = material.replace(p_m=_between("--p-m-Pa", p_m_pa, 1.0, 1e8))
     material = _apply(settings or [], material)
@@ -134,6 +148,9 @@ def simulate(
             spacing=spacing or radius / 8.0,
             depth=None,
         )
+    unseen = []
+    if extended is not None and model is not None:
+        setting, unseen = _extend(setting, extended, model, read, chosen, known)
     if time_ms is not None:
         setting = setting.replace(duration=_between("--time-ms", time_ms, 1e-3, 1e4) * 1e-3)
     plan = refine(setting, spacings) if spacings is not None else [setting]
@@ -145,6 +162,7 @@ def simulate(
         found = RunStore(store).get_many(plan, workers=workers, scheduler=scheduler, progress=progress)
     runs = require_runs(found)
     summary, lines = write_run(runs, folder)
+    lines = "\n".join([lines, *unseen])
     options.finish(summary, f"{lines}\nwritten to {folder}", as_json=as_json, quiet=quiet)
 
 
@@ -238,14 +256,28 @@ def _apply(settings: list[str], material: Material) -> Material:
     return material
 
 
-def _read_model(path: Path, material: Material) -> Material:
-    """A model.toml as ``labsim diagnose`` writes it: [material] with p_m_Pa and any key of campaign.toml's."""
-    document = Document(path)
-    document.top()
-    table = document.table("material")
-    changes = {"p_m": table.number("p_m_Pa", 1.0, 1e8)} if table.has("p_m_Pa") else {}
-    for key, (field, low, high) in MATERIAL_KEYS.items():
-        if table.has(key):
-            changes[field] = table.number(key, low, high)
-    document.close()
-    return material.replace(**changes)
+def _extend(
+    setting: DropSetting,
+    model: Model,
+    file: Path,
+    read: Campaign | None,
+    chosen: Drop | None,
+    known: dict[str, Effect],
+) -> tuple[DropSetting, list[str]]:
+    """The setting with the model's effects, and a line about each that acts on the measurement only."""
+    if read is None or chosen is None:
+        usual = reference_campaign()
+        drop = replace(usual.drops[0], projectile=setting.projectile)
+        read = replace(
+            usual, gravity=setting.gravity, geometry=setting.geometry, drops=(drop,) * len(usual.drops)
+        )
+        place = replace(list_places(read)[drop.name], sequence_fraction=0.0)
+    else:
+        place = list_places(read)[chosen.name]
+    check_model(model, read, known, file)
+    lines = [
+        f"{name} acts on what is measured, not on the drop; this run is the true motion without it"
+        for name, _ in model.effects
+        if not known[name].costs_runs
+    ]
+    return apply_effects(setting, model.effects, place, known), lines

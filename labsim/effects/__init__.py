@@ -19,6 +19,7 @@ from .contract import (
     list_thrown,
 )
 from .loading import CATALOGUE, list_effects, load_effect, load_file, reference_campaign
+from .model import Model, apply_effects, apply_model, check_model, make_instrument, read_model, write_model
 from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
 
 __all__ = [
@@ -30,12 +31,16 @@ __all__ = [
     "Instrument",
     "Kind",
     "LogNormal",
+    "Model",
     "Normal",
     "Parameter",
     "Place",
     "Prior",
     "Uniform",
     "Values",
+    "apply_effects",
+    "apply_model",
+    "check_model",
     "deepest_dust",
     "deepest_expected",
     "list_effects",
@@ -43,5 +48,8 @@ __all__ = [
     "list_thrown",
     "load_effect",
     "load_file",
+    "make_instrument",
+    "read_model",
     "reference_campaign",
+    "write_model",
 ]

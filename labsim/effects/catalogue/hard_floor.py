@@ -32,10 +32,12 @@ def parameters(campaign):
 
 
 leaves = (
-    "The deepest drops stop short and rebound, the others are as they should be; with two radii the larger tip feels it "
+    "The deepest drops stop short, the others are as they should be; with two radii the larger tip feels it "
     "at smaller depths in units of its radius."
 )
-references = ("Seguin, Bertho & Gondret (2008), Phys. Rev. E 78, 010301: impact close to a bottom wall",)
+references = (
+    "Seguin, Bertho & Gondret (2008), Phys. Rev. E 78, 010301: influence of confinement on granular penetration by impact",
+)
 expect = {"penetration_depth": 1}
 
 

@@ -28,7 +28,7 @@ references = (
     "Royer et al. (2007), Phys. Rev. Lett. 99, 038003; Homan & van der Meer (2016): gas in granular impact",
     "Ideal gas at constant temperature in the pore volume 1 - φ",
 )
-expect = {"penetration_depth": -1, "stopping_time": -1}
+expect = {"penetration_depth": -1}
 
 
 def change_setting(setting, values, place):

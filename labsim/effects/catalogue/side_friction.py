@@ -26,10 +26,7 @@ leaves = (
     "Long thin rods stop early in deep drops, and the deceleration rises towards the end; light projectiles most, beads not "
     "at all, so that rods and the bead in the CT disagree on p_m."
 )
-references = (
-    "Reddy, Forterre & Pouliquen (2011), Phys. Rev. Lett. 106, 108301: vertical drag on rods in grains",
-    "Shear strength times circumference, as an upper bound",
-)
+references = ("Bound: shear strength of the dust times the rod's circumference",)
 expect = {"penetration_depth": -1, "stopping_time": -1}
 
 

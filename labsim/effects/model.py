@@ -1,0 +1,197 @@
+"""The extended model as a file: p_m, keys of the material that differ from the nominal ones, effects with their values.
+
+    format = 1
+
+    [material]
+    p_m_Pa = 1012.0
+
+    [effects.strength_rate]
+    eta = 0.052
+    n = 0.5
+
+``labsim diagnose`` writes it, ``labsim simulate --model`` and ``labsim calibrate --model`` take it, people may write it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..campaign import MATERIAL_KEYS
+from ..errors import EffectError
+from ..records import Campaign
+from ..sph import DropSetting
+from .contract import Effect, Instrument, Place, Values
+from .loading import list_effects
+
+FORMAT = 1
+P_M_RANGE = (1.0, 1.0e8)  # Pa
+
+
+@dataclass(frozen=True)
+class Model:
+    """p_m in Pa; effects as (name, values by parameter); material as (field of Material, value) besides p_m."""
+
+    p_m: float
+    effects: tuple[tuple[str, Values], ...] = ()
+    material: tuple[tuple[str, float], ...] = ()
+
+
+def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) -> Model:
+    """Read a model.toml. effects: what list_effects gives for the campaign; the catalogue if None. Raises EffectError."""
+    path = Path(path)
+    known = effects if effects is not None else list_effects()
+    document = _load(path)
+    _refuse_others(path, "", document, ("format", "material", "effects"))
+    if document.get("format", FORMAT) != FORMAT:
+        raise EffectError(
+            path, "format", f"{document['format']!r} is not a format this labsim reads; write {FORMAT}"
+        )
+    material = _table(path, "material", document.get("material", {}))
+    _refuse_others(path, "material", material, ("p_m_Pa", *MATERIAL_KEYS))
+    if "p_m_Pa" not in material:
+        raise EffectError(path, "material.p_m_Pa", "is missing; write p_m in Pa under [material]")
+    p_m = _number(path, "material.p_m_Pa", material["p_m_Pa"], *P_M_RANGE)
+    fields = tuple(
+        (field, _number(path, f"material.{key}", material[key], low, high))
+        for key, (field, low, high) in MATERIAL_KEYS.items()
+        if key in material
+    )
+    chosen = []
+    for name, values in _table(path, "effects", document.get("effects", {})).items():
+        key = f"effects.{name}"
+        if name not in known:
+            raise EffectError(path, key, f"is not an effect{_guess(name, known)}; labsim effects lists them")
+        effect = known[name]
+        values = _table(path, key, values)
+        _refuse_others(path, key, values, [parameter.name for parameter in effect.parameters])
+        for parameter in effect.amplitudes:
+            if parameter.name not in values:
+                raise EffectError(
+                    path,
+                    f"{key}.{parameter.name}",
+                    f"is missing; write it in {parameter.unit} ({parameter.null:g} is off)",
+                )
+        chosen.append(
+            (
+                name,
+                {
+                    parameter.name: _number(
+                        path, f"{key}.{parameter.name}", values[parameter.name], *parameter.limits
+                    )
+                    for parameter in effect.parameters
+                    if parameter.name in values
+                },
+            )
+        )
+    return Model(p_m, tuple(chosen), fields)
+
+
+def write_model(
+    path: Path | str,
+    model: Model,
+    effects: Mapping[str, Effect] | None = None,
+    comments: Sequence[str] = (),
+) -> Path:
+    """Write a model.toml that read_model gives back exactly; comments stand at its top."""
+    path = Path(path)
+    known = effects if effects is not None else list_effects()
+    keys = {field: key for key, (field, _, _) in MATERIAL_KEYS.items()}
+    lines = [f"# {line}" for comment in comments for line in comment.splitlines()]
+    lines += [f"format = {FORMAT}", "", "[material]", f"p_m_Pa = {float(model.p_m)!r}"]
+    lines += [f"{keys[field]} = {float(value)!r}" for field, value in model.material]
+    for name, values in model.effects:
+        if name not in known:
+            raise EffectError(path, f"effects.{name}", f"is not an effect{_guess(name, known)}")
+        effect = known[name]
+        lines += ["", f"[effects.{name}]  # {effect.title}"]
+        for key, value in values.items():
+            lines.append(f"{key} = {float(value)!r}  # {effect.parameter(key).unit}")
+    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    os.replace(aside, path)
+    return path
+
+
+def check_model(
+    model: Model, campaign: Campaign, effects: Mapping[str, Effect], file: Path | str = "model"
+) -> None:
+    """Raise EffectError where an effect of the model cannot be at work in this campaign."""
+    for name, _ in model.effects:
+        if reason := effects[name].applies(campaign):
+            raise EffectError(file, f"effects.{name}", f"does not apply here: {reason}; remove it")
+
+
+def apply_effects(
+    setting: DropSetting,
+    chosen: Iterable[tuple[str, Values]],
+    place: Place,
+    effects: Mapping[str, Effect] | None = None,
+) -> DropSetting:
+    """The drop with the effects that touch it; the geometry changes first, the others in the order given."""
+    known = effects if effects is not None else list_effects()
+    for name, values in sorted(chosen, key=lambda each: each[0] != "planar_geometry"):
+        setting = known[name].apply(setting, values, place)
+    return setting
+
+
+def apply_model(
+    setting: DropSetting, model: Model, place: Place, effects: Mapping[str, Effect] | None = None
+) -> DropSetting:
+    """The drop as the model has it: its p_m and material, then its effects."""
+    material = setting.material.replace(p_m=model.p_m, **dict(model.material))
+    return apply_effects(setting.replace(material=material), model.effects, place, effects)
+
+
+def make_instrument(model: Model, place: Place, effects: Mapping[str, Effect] | None = None) -> Instrument:
+    """What the model says of the measurement."""
+    known = effects if effects is not None else list_effects()
+    instrument = Instrument()
+    for name, values in model.effects:
+        instrument = known[name].apply_to_instrument(instrument, values, place)
+    return instrument
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as stream:
+            return tomllib.load(stream)
+    except FileNotFoundError:
+        raise EffectError(path, "", "no such file; name a model.toml as labsim diagnose writes it") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as trouble:
+        raise EffectError(path, "", f"is not TOML: {trouble}; correct that line") from None
+    except OSError as trouble:
+        raise EffectError(path, "", f"cannot be read ({trouble.strerror}); name a model.toml") from None
+
+
+def _table(path: Path, key: str, values: Any) -> dict[str, Any]:
+    if not isinstance(values, dict):
+        raise EffectError(path, key, f"{values!r} is not a table; write [{key}] on a line of its own")
+    return values
+
+
+def _number(path: Path, key: str, value: Any, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise EffectError(path, key, f"{value!r} is not a finite number; write a plain one")
+    if not low <= value <= high:
+        raise EffectError(path, key, f"{value:g} is outside {low:.4g} to {high:.4g}; write one between them")
+    return float(value)
+
+
+def _refuse_others(path: Path, table: str, values: Mapping[str, Any], allowed: Iterable[str]) -> None:
+    for key in values:
+        if key not in (allowed := list(allowed)):
+            where = f"{table}.{key}" if table else key
+            use = ", ".join(allowed) or "nothing, it has no parameter"
+            raise EffectError(path, where, f"is not a key of a model{_guess(key, allowed)}; use {use}")
+
+
+def _guess(word: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
+    return f" (did you mean {near[0]}?)" if near else ""
