@@ -1,0 +1,112 @@
+"""Cupping and rings, which are centred on the scanner's axis, and are taken out before averaging about the bead's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ..records import FloatArray
+from .bead import Bead
+from .stack import SliceStack
+from .surface import Surface
+
+
+@dataclass(frozen=True)
+class Cupping:
+    """Dust's grey against the distance rho from the scanner's axis, a + b rho^2, below and away from the bead.
+
+    amount : grey levels between the middle and the rim, sigma its uncertainty; left_over : rms of the radial profile
+    after the fit; image : (ny, nx) to subtract, zero on average over the slice.
+    """
+
+    amount: float = 0.0
+    sigma: float = float("nan")
+    left_over: float = 0.0
+    followed: bool = False
+    image: FloatArray | float = 0.0
+
+
+def fit_cupping(stack: SliceStack, axis: tuple[float, float], bead: Bead, surface: Surface) -> Cupping:
+    """Fit a parabola (and a fourth power where it helps) to the deep slices; followed from 4 sigma and 0.3 % of dust."""
+    ny, nx = stack.shape
+    start = int(bead.centre[2] + 3.2 * bead.stated_radius)
+    start = max(start, int(surface.row + 8))
+    if stack.count - start < 4:
+        return Cupping()
+    deep = np.zeros((ny, nx))
+    square = np.zeros((ny, nx))
+    rows = range(start, stack.count, max(1, (stack.count - start) // 40))
+    for k in rows:
+        image = stack.slice(k).astype(float)
+        deep += image
+        square += image**2
+    deep /= len(rows)
+    y, x = np.mgrid[:ny, :nx]
+    rho = np.hypot(x - (nx - 1) / 2, y - (ny - 1) / 2) / (min(nx, ny) / 2)
+    inside = rho < 1
+    noise = float(np.sqrt(np.median(square / len(rows) - deep**2) / len(rows)))
+    design = np.column_stack([np.ones(inside.sum()), rho[inside] ** 2, rho[inside] ** 4])
+    values = deep[inside]
+    best = None
+    for terms in (2, 3):
+        a = design[:, :terms]
+        solution = np.linalg.lstsq(a, values, rcond=None)[0]
+        chi2 = float(((values - a @ solution) ** 2).sum()) / max(noise, 1e-9) ** 2
+        if best is None or chi2 < best[2] - 25:
+            covariance = np.linalg.inv(a.T @ a) * max(noise, 1e-9) ** 2
+            end = np.array([0.0, 1.0, 1.0])[:terms]
+            best = (solution, float(np.sqrt(end @ covariance @ end)), chi2)
+    solution, sigma, _ = best
+    amount = float(solution[1:].sum())
+    full = sum(c * np.minimum(rho, 1.2) ** p for c, p in zip(solution[1:], (2, 4), strict=False))
+    full = full - full[inside].mean()
+    bins = (rho[inside] * 30).astype(int)
+    profile = np.bincount(bins, values - solution[0] - (full[inside] + 0)) / np.maximum(np.bincount(bins), 1)
+    left_over = float(np.std(profile))
+    followed = abs(amount) > 4 * sigma and abs(amount) > 0.003 * (surface.dust - surface.air)
+    return Cupping(amount, sigma, left_over, followed, full.astype(np.float32) if followed else 0.0)
+
+
+def remove_rings(grey: FloatArray, hidden: np.ndarray | None, noise: float) -> tuple[FloatArray, float]:
+    """One slice without its rings, and how strong they were (grey levels rms, 0 where nothing was removed).
+
+    A ring is what the mean over the azimuth about the scanner's axis has beyond a running median over the radius; rings
+    are removed where they stand above the noise that such a mean has (3 sigma and more than chance over all radii).
+    grey : (ny, nx); hidden : (ny, nx) bool or None, voxels that say nothing.
+    """
+    ny, nx = grey.shape
+    index, reach = _ring_index(ny, nx)
+    use = index < reach
+    if hidden is not None:
+        use &= ~hidden
+    which, values = index[use], grey[use]
+    count = np.bincount(which, minlength=reach)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        profile = np.bincount(which, values, reach) / count
+    good = count > 6
+    if good.sum() < 20:
+        return grey, 0.0
+    filled = np.interp(np.arange(reach), np.flatnonzero(good), profile[good])
+    ring = np.where(good, filled - median_filter(filled, 9, mode="nearest"), 0.0)
+    expected = noise * 1.2 / np.sqrt(np.maximum(count, 1))
+    if np.sum(ring[good] ** 2) < 3.0 * np.sum(expected[good] ** 2):
+        return grey, 0.0
+    kept = np.where(np.abs(ring) > 2.0 * expected, ring, 0.0)
+    corrected = grey.copy()
+    everywhere = index < reach
+    corrected[everywhere] -= kept[index[everywhere]].astype(grey.dtype)
+    return corrected, float(np.sqrt(np.mean(kept[good] ** 2)))
+
+
+_RINGS: dict[tuple[int, int], tuple[np.ndarray, int]] = {}
+
+
+def _ring_index(ny: int, nx: int) -> tuple[np.ndarray, int]:
+    if (ny, nx) not in _RINGS:
+        y, x = np.mgrid[:ny, :nx]
+        rho = np.hypot(x - (nx - 1) / 2, y - (ny - 1) / 2)
+        _RINGS.clear()
+        _RINGS[ny, nx] = (np.rint(rho).astype(int), int(min(nx, ny) / 2))
+    return _RINGS[ny, nx]

@@ -1,0 +1,38 @@
+"""HDF5 in the DXchange layout: slices of a reconstructed volume in /exchange/data, axes (z, y, x)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+
+from ...errors import MeasurementError
+from ..stack import SliceStack
+
+SUFFIXES = (".h5", ".hdf5", ".hdf", ".nx", ".nxs")
+
+
+def recognise(path: Path) -> bool:
+    return path.is_file() and path.suffix.lower() in SUFFIXES
+
+
+def open_stack(path: Path) -> SliceStack:
+    """Open the volume of a DXchange file; raises MeasurementError where it holds projections or nothing."""
+    try:
+        file = h5py.File(path, "r")
+    except OSError as trouble:
+        raise MeasurementError(path, "scan.slices", f"is not a readable HDF5 file ({trouble})") from None
+    if "exchange/data" not in file:
+        raise MeasurementError(path, "exchange/data", "is missing; DXchange keeps the volume there")
+    data = file["exchange/data"]
+    if "exchange/theta" in file or "exchange/data_white" in file:
+        raise MeasurementError(
+            path, "exchange/data", "holds projections, not slices; labsim.ct.reconstruct makes slices of them"
+        )
+    if data.ndim != 3 or data.shape[0] < 8:
+        raise MeasurementError(path, "exchange/data", f"has shape {data.shape}; (slices >= 8, rows, columns) is needed")
+    voxel = data.attrs.get("voxel_m")
+    return SliceStack(
+        path, data.shape[0], data.shape[1:], data.dtype, lambda k: data[k],
+        None if voxel is None else float(voxel), {"format": "hdf5"},
+    )  # fmt: skip

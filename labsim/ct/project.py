@@ -1,0 +1,139 @@
+"""A simulated dust seen through a scan's own cells, point spread and mask: what is compared with the scan.
+
+Mass is conserved: every particle's mass lands in the cells in full (but for what leaves the map's frame).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import ive
+
+from ..records import FillingMap, FloatArray
+
+FINE = 2  # fine bins along an edge of a cell
+
+
+def project(
+    r: FloatArray,
+    z: FloatArray,
+    volume: FloatArray,
+    filling_factor: FloatArray,
+    scan_map: FillingMap,
+    *,
+    blur: float = 0.0,
+    scale: float = 1.0,
+    shift: float = 0.0,
+    geometry: str = "ring",
+    masked: np.ndarray | None = None,
+) -> FloatArray:
+    """Filling factor of a set of SPH particles on the cells of a scan's map, (nz, nr), NaN where the map is masked.
+
+    r, z, volume, filling_factor : (n,); r, z in m with z = 0 at the undisturbed surface and negative below; volume is a
+    particle's own volume at its filling factor: of a ring, m^3 ("ring"), or of a cross-section, m^2 ("planar": it is
+    turned about the axis as if it were round).
+    blur : m, standard deviation of the point spread in three dimensions. scale : factor on the filling factor that the
+    scan reads (a wrong grey calibration). shift : m, the dust moved upwards against the scan.
+    masked : (nz, nr) bool, default the NaN cells of the map. A particle is a square of its own area, so a lattice of
+    particles gives a smooth map. Around 5 ms for 10^4 particles once the cells are known.
+    """
+    edges_r, edges_z = _fine_edges(scan_map)
+    r, z = np.abs(np.asarray(r, float)), np.asarray(z, float) + shift
+    volume, phi = np.asarray(volume, float), np.asarray(filling_factor, float)
+    area = volume / (2 * np.pi * np.maximum(r, 1e-12)) if geometry == "ring" else volume
+    mass = phi * (volume if geometry == "ring" else 2 * np.pi * r * volume)
+    # a ring particle at the axis has more area than its width allows: its square ends at the axis
+    half = 0.5 * np.sqrt(area)
+    half_r = np.minimum(half, np.maximum(r, 1e-9))
+    half_z = area / (4 * half_r)
+    deposit = _deposit(r - half_r, r + half_r, z - half_z, z + half_z, mass, edges_r, edges_z)
+    if blur > 0:
+        across, along = _blur_matrices(
+            float(edges_r[1] - edges_r[0]), len(edges_r) - 1, float(edges_z[1] - edges_z[0]), len(edges_z) - 1, float(blur)
+        )
+        deposit = along @ deposit @ across
+    nz, nr = scan_map.filling_factor.shape
+    pad_r, pad_z = _padding(scan_map)
+    inner = deposit[pad_z : pad_z + nz * FINE, : nr * FINE]
+    cells = inner.reshape(nz, FINE, nr, FINE).sum((1, 3))[::-1]
+    dr, dz = _steps(scan_map)
+    seen = scale * cells / (2 * np.pi * scan_map.r * dr * dz)
+    hidden = ~np.isfinite(scan_map.filling_factor) if masked is None else masked
+    return np.where(hidden, np.nan, seen)
+
+
+def _steps(scan_map: FillingMap) -> tuple[float, float]:
+    return float(np.mean(np.diff(scan_map.r))), float(np.mean(-np.diff(scan_map.z)))
+
+
+def _padding(scan_map: FillingMap) -> tuple[int, int]:
+    """Fine bins beyond the frame, so that the blur has dust to draw on: 4 cells."""
+    return 4 * FINE, 4 * FINE
+
+
+def _fine_edges(scan_map: FillingMap) -> tuple[FloatArray, FloatArray]:
+    """Edges of the fine bins, both rising: r from the axis outwards, z from below upwards."""
+    dr, dz = _steps(scan_map)
+    pad_r, pad_z = _padding(scan_map)
+    edges_r = np.arange(len(scan_map.r) * FINE + pad_r + 1) * (dr / FINE)
+    bottom = scan_map.z.min() - dz / 2 - pad_z * dz / FINE
+    edges_z = bottom + np.arange(len(scan_map.z) * FINE + 2 * pad_z + 1) * (dz / FINE)
+    return edges_r, edges_z
+
+
+def _deposit(
+    r_low: FloatArray, r_high: FloatArray, z_low: FloatArray, z_high: FloatArray, mass: FloatArray,
+    edges_r: FloatArray, edges_z: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Mass per fine bin (nz, nr): rectangles spread over the bins, across r in proportion to r as rings hold it."""
+    nr, nz = len(edges_r) - 1, len(edges_z) - 1
+    step_r, step_z = edges_r[1] - edges_r[0], edges_z[1] - edges_z[0]
+    keep = (r_low < edges_r[-1]) & (z_high > edges_z[0]) & (z_low < edges_z[-1]) & (mass > 0)
+    r_low, r_high, z_low, z_high, mass = (a[keep] for a in (r_low, r_high, z_low, z_high, mass))
+    first_r = np.floor(r_low / step_r).astype(np.int64)
+    first_z = np.floor((z_low - edges_z[0]) / step_z).astype(np.int64)
+    wide = int(np.max(np.floor(r_high / step_r) - first_r, initial=0)) + 1
+    tall = int(np.max(np.floor((z_high - edges_z[0]) / step_z) - first_z, initial=0)) + 1
+    ring = r_high**2 - r_low**2
+    share_r = np.empty((wide, len(mass)))
+    for i in range(wide):
+        low = np.maximum((first_r + i) * step_r, r_low)
+        high = np.minimum((first_r + i + 1) * step_r, r_high)
+        share_r[i] = np.where(high > low, high**2 - low**2, 0.0) / ring
+    result = np.zeros(nz * nr)
+    for k in range(tall):
+        low = np.maximum(edges_z[0] + (first_z + k) * step_z, z_low)
+        high = np.minimum(edges_z[0] + (first_z + k + 1) * step_z, z_high)
+        part = np.maximum(high - low, 0.0) / (z_high - z_low) * mass
+        row = first_z + k
+        for i in range(wide):
+            column = first_r + i
+            inside = (row >= 0) & (row < nz) & (column < nr)
+            result += np.bincount(
+                (row[inside] * nr + column[inside]), (part * share_r[i])[inside], minlength=nz * nr
+            )
+    return result.reshape(nz, nr)
+
+
+@lru_cache(maxsize=32)
+def _blur_matrices(step_r: float, nr: int, step_z: float, nz: int, blur: float) -> tuple[FloatArray, FloatArray]:
+    """Right factor (nr, nr) for r and left factor (nz, nz) for z; rows (columns) sum to 1, so mass stays.
+
+    Around an axis a Gaussian spreads a ring at r' to exp(-(r - r')^2 / 2 s^2) I0e(r r' / s^2) r dr / s^2. At the outer
+    edges, and below, what leaves comes back as from a mirror: the frame is cut from a larger body of dust.
+    """
+    r = (np.arange(nr + int(6 * blur / step_r) + 2) + 0.5) * step_r
+    spread = np.exp(-((r[None, :] - r[:nr, None]) ** 2) / (2 * blur**2)) * ive(0, r[None, :] * r[:nr, None] / blur**2) * r[None, :]
+    spread /= spread.sum(1, keepdims=True)
+    extra = spread[:, nr:]
+    spread = spread[:, :nr].copy()
+    spread[:, nr - 1 : nr - 1 - extra.shape[1] : -1] += extra[:, : min(extra.shape[1], nr - 1)]
+    spread /= spread.sum(1, keepdims=True)
+    z = np.arange(nz) * step_z
+    along = np.exp(-((z[:, None] - z[None, :]) ** 2) / (2 * blur**2))
+    along /= along.sum(0, keepdims=True)
+    return spread, along
+
+
+__all__ = ["project"]

@@ -1,0 +1,306 @@
+"""From a scan to its axisymmetric map of the filling factor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import MeasurementError
+from ..records import FillingMap, FloatArray, Measured, Scan
+from .artefacts import Cupping, fit_cupping, remove_rings
+from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
+from .bead import Bead, find_bead
+from .stack import SliceStack, open_stack
+from .surface import Surface, find_surface
+
+CELL = 2  # voxels along an edge of a cell
+GUARD = 3.0  # voxels about the bead that belong to its point spread, not to the dust
+TILT_SEEN = (4.0, np.deg2rad(0.4))  # a lean is followed where it is this many sigma and at least this large
+RINGS_SEEN = 0.3  # share of the slices that must show rings before any are taken out
+
+
+@dataclass(frozen=True)
+class GreyCheck:
+    """The calibration that was used and what the scan itself says about it.
+
+    grey_air_stated, grey_air : levels; filling_factor_air : of the measured air, should be 0;
+    scale_air_dust : factor on the filling factor if air and undisturbed dust (of the stated sample) were the two points,
+    NaN where no sample was given; clipped, saturated : shares of dust and air voxels at the ends of the range.
+    """
+
+    grey_air_stated: float
+    grey_air: float
+    filling_factor_air: float
+    scale_air_dust: float
+    clipped: float
+    saturated: float
+
+
+@dataclass(frozen=True)
+class ReducedScan:
+    """Everything ``reduce_scan`` found.
+
+    map.sigma is random error only; the calibration's scale error is common to all cells. correlation_r/z : between
+    neighbouring cells of the undisturbed dust. blur : m, standard deviation of the point spread (bead edge, across the
+    axis). dust_mass : kg within the map outside the guard; mass_excess : kg, of filling factor above the undisturbed,
+    per ``ledger_mass`` (kg of dust that the bead displaced).
+    """
+
+    scan: Scan
+    map: FillingMap
+    errors: CellErrors
+    bead: Bead
+    surface: Surface
+    grey: GreyCheck
+    undisturbed: Measured
+    voxel_noise: float
+    blur: float
+    tilt: tuple[float, float]  # rad, along x and y
+    tilt_sigma: float  # rad
+    tilt_followed: bool
+    cupping: Cupping
+    ring_rms: float
+    masked: np.ndarray  # (nz, nr) True where a cell touches the bead's guard
+    facts: dict = field(default_factory=dict)
+
+    @property
+    def bead_centre_z(self) -> float:
+        """m, of the tip sphere's centre; 0 at the undisturbed surface, negative below."""
+        return -self.map.tip_depth + self.map.bead_radius
+
+
+def reduce_scan(
+    scan: Scan,
+    *,
+    cell: int = CELL,
+    guard: float = GUARD,
+    sample_filling_factor: float | None = None,
+    correct: bool = True,
+    progress: Callable[[float, float, str], None] | None = None,
+) -> ReducedScan:
+    """Reduce one scan: bead and axis, free surface, artefacts, azimuthal mean with an error for each cell.
+
+    cell : voxels along an edge of a cell. guard : voxels about the bead that are left out. sample_filling_factor : of the
+    campaign's sample, for the cross-check of the grey calibration only. correct : remove cupping and rings where they
+    are significant. Raises MeasurementError, one line that names file and key.
+    """
+    report = progress or (lambda done, total, text: None)
+    stack = open_stack(scan.slices)
+    stack.flipped = scan.first_slice == "bottom"
+    warnings = list(stack.warnings)
+    check_levels(stack, scan)
+    if stack.voxel is not None and abs(stack.voxel / scan.voxel - 1) > 0.01:
+        raise MeasurementError(
+            scan.slices, "scan.voxel_um",
+            f"is {scan.voxel * 1e6:g} but the files state {stack.voxel * 1e6:g}; correct scan.toml",
+        )  # fmt: skip
+    report(0, 4, "bead")
+    bead = find_bead(stack, scan)
+    warnings += bead.warnings
+    report(1, 4, "surface")
+    x, y, k_bead = bead.centre
+    surface = find_surface(stack, (x, y), k_bead, bead.stated_radius)
+    report(2, 4, "azimuthal mean")
+    ny, nx = stack.shape
+    reach = min(x, y, nx - 1 - x, ny - 1 - y) + 0.5
+    cupping, ring_rms, corrections = Cupping(), 0.0, None
+    hidden = _bead_mask(stack, scan, bead, guard)
+    if correct:
+        cupping = fit_cupping(stack, (x, y), bead, surface)
+        if cupping.followed:
+            warnings.append(f"cupping removed: {cupping.amount / (surface.dust - surface.air):.1%} of the dust's level")
+
+    def average(tilt: tuple[float, float], rings_too: bool = True) -> tuple[SectorAverage, float]:
+        sums = SectorAverage((ny, nx), stack.count, (x, y, k_bead), cell, reach, tilt)
+        rings = []
+        for k, image in enumerate(stack):
+            mask = hidden(k, tilt)
+            grey = image.astype(np.float32)
+            if correct:
+                if cupping.followed and k > surface.row:
+                    grey -= cupping.image
+                if rings_too and k > surface.row + 2:
+                    grey, rms = remove_rings(grey, mask, surface.dust_scatter)
+                    rings.append(rms)
+            sums.add(k, to_filling_factor(grey, scan), mask)
+        if rings and np.mean(np.array(rings) > 0) < RINGS_SEEN:  # the bead's own edge, not the detector
+            return average(tilt, rings_too=False)
+        return sums, float(np.mean(rings)) if rings else 0.0
+
+    sums, ring_rms = average((0.0, 0.0))
+    if ring_rms > 0:
+        warnings.append(f"rings removed: {ring_rms:.2f} grey levels rms")
+    rows = (np.arange(sums.nz) + 0.5) * cell - 0.5
+    undisturbed_cells = _undisturbed_cells(sums, rows, bead, surface)
+    errors = estimate_errors(sums.sums(), undisturbed_cells)
+    tilt, tilt_sigma = fit_tilt(sums.sums(), errors, k_bead, rows, 3.0 * bead.stated_radius)
+    size = float(np.hypot(*tilt))
+    followed = size > TILT_SEEN[0] * tilt_sigma and size > np.tan(TILT_SEEN[1])
+    if followed:
+        for _ in range(2):
+            sums, ring_rms = average(tilt)
+            more, _ = fit_tilt(sums.sums(), estimate_errors(sums.sums(), undisturbed_cells), k_bead, rows, 3.0 * bead.stated_radius)
+            tilt = (tilt[0] + more[0], tilt[1] + more[1])
+        sums, ring_rms = average(tilt)
+        errors = estimate_errors(sums.sums(), undisturbed_cells)
+        warnings.append(f"the axis leans by {np.rad2deg(np.hypot(*tilt)):.1f} degrees; the mean follows it")
+    report(3, 4, "map")
+    voxel = scan.voxel
+    r = (np.arange(sums.nr) + 0.5) * cell * voxel
+    z = (surface.row - rows) * voxel
+    parts = sums.sums()
+    count = parts.count.sum(2)
+    phi, sigma = parts.mean(), errors.sigma.copy()
+    tip_depth = (k_bead + bead.stated_radius - surface.row) * voxel
+    rod = scan.projectile.tip != "sphere"
+    masked = mask_near_bead(
+        r, z, cell * voxel, -tip_depth + scan.projectile.tip_radius, scan.projectile.tip_radius, guard * voxel, rod=rod
+    )
+    phi[masked], sigma[masked] = np.nan, np.nan
+    level, level_sigma = _undisturbed_level(phi, sigma, undisturbed_cells & ~masked)
+    grey = _check_grey(stack, scan, surface, hidden, level, sample_filling_factor)
+    warnings += _grey_warnings(grey, surface, bead, scan, level, level_sigma)
+    if not 0 < level < 1:
+        raise MeasurementError(
+            scan.slices, "calibration.grey_per_density",
+            f"gives a filling factor of {level:.3f} for the undisturbed dust; it must lie between 0 and 1",
+        )  # fmt: skip
+    if surface.tilt > np.deg2rad(1.5):
+        warnings.append(f"the dust's surface leans by {np.rad2deg(surface.tilt):.1f} degrees against the slices")
+    filling = FillingMap(
+        r, z, phi, sigma, np.where(masked, 0, count), tip_depth, scan.projectile.tip_radius, (x, y), tuple(warnings)
+    )
+    report(4, 4, "map")
+    return ReducedScan(
+        scan=scan, map=filling, errors=replace(errors, sigma=sigma), bead=bead, surface=surface, grey=grey,
+        undisturbed=Measured(level, level_sigma), voxel_noise=errors.voxel_noise, blur=bead.blur_lateral * voxel,
+        tilt=(float(np.arctan(tilt[0])), float(np.arctan(tilt[1]))), tilt_sigma=float(tilt_sigma),
+        tilt_followed=bool(followed), cupping=cupping, ring_rms=ring_rms, masked=masked,
+        facts={**stack.facts, "slices": stack.count, "shape": list(stack.shape), "cell": cell, "guard": guard},
+    )  # fmt: skip
+
+
+def to_filling_factor(grey: FloatArray, scan: Scan) -> FloatArray:
+    """Filling factor of grey levels by scan.toml's calibration, the same shape."""
+    c = scan.calibration
+    return (grey - c.grey_air) / (c.grey_per_density * c.density_solid)
+
+
+def check_levels(stack: SliceStack, scan: Scan) -> None:
+    """Hold the stated bit depth against the files. Raises MeasurementError."""
+    top = 2**scan.bits - 1
+    if stack.dtype.kind in "ui" and scan.bits > 8 * stack.dtype.itemsize:
+        raise MeasurementError(
+            scan.slices, "scan.bits", f"is {scan.bits} but the slices have {8 * stack.dtype.itemsize}; correct scan.toml"
+        )
+    brightest = max(float(stack.slice(k).max()) for k in range(0, stack.count, max(1, stack.count // 40)))
+    if stack.dtype.kind in "ui" and brightest > top:
+        raise MeasurementError(
+            scan.slices, "scan.bits", f"is {scan.bits} but a slice holds grey level {brightest:.0f}; correct scan.toml"
+        )
+    if scan.calibration.grey_per_density <= 0:
+        raise MeasurementError(scan.slices, "calibration.grey_per_density", "must be positive: denser is brighter")
+
+
+def mask_near_bead(
+    r: FloatArray, z: FloatArray, cell: float, bead_centre_z: float, bead_radius: float, guard: float, *, rod: bool = False
+) -> np.ndarray:
+    """Cells (nz, nr) that come closer to the measured bead than the guard: True where nothing is to be compared.
+
+    r, z : (nr,), (nz,) m, cell centres; cell : m, edge of a cell; bead_centre_z : m, 0 at the surface, negative below.
+    A rod hides everything above its tip's centre within its radius and the guard. Depends on the bead alone.
+    """
+    dr = np.maximum(r - cell / 2, 0)[None, :]
+    dz = np.maximum(np.abs(z - bead_centre_z) - cell / 2, 0)[:, None]
+    near = np.hypot(dr, dz) < bead_radius + guard
+    if rod:
+        near |= (z[:, None] > bead_centre_z) & (dr < bead_radius + guard)
+    return near
+
+
+def _bead_mask(stack: SliceStack, scan: Scan, bead: Bead, guard: float) -> Callable:
+    """Function (slice, tilt) -> (ny, nx) bool of voxels in the bead or its guard, None where there are none."""
+    x0, y0, k0 = bead.centre
+    radius = max(bead.stated_radius, bead.radius) + guard
+    x = np.arange(stack.shape[1])[None, :]
+    y = np.arange(stack.shape[0])[:, None]
+    rod = scan.projectile.tip != "sphere"
+
+    def hidden(k: int, tilt: tuple[float, float]) -> np.ndarray | None:
+        above = rod and k < k0
+        height = 0.0 if above else k - k0
+        if abs(height) >= radius:
+            return None
+        dx, dy = ((k - k0) * t for t in tilt) if above else (0.0, 0.0)
+        return (x - x0 - dx) ** 2 + (y - y0 - dy) ** 2 + height**2 < radius**2
+
+    return hidden
+
+
+def _undisturbed_cells(sums: SectorAverage, rows: FloatArray, bead: Bead, surface: Surface) -> np.ndarray:
+    """Dust far below the bead; where the stack ends there, dust far beside it."""
+    r = (np.arange(sums.nr) + 0.5) * sums.cell
+    distance = np.hypot(r[None, :], (rows - bead.centre[2])[:, None])
+    deep = (rows[:, None] > surface.row + 6 + 3 * surface.width) & (distance > 3.5 * bead.stated_radius)
+    below = deep & (rows[:, None] > bead.centre[2] + 3.5 * bead.stated_radius)
+    cells = below if below.sum() > 60 else deep
+    if cells.sum() < 30:
+        raise MeasurementError(
+            "scan", "scan.slices", "no undisturbed dust is in view (3.5 bead radii away); export more slices below the bead"
+        )
+    return cells
+
+
+def _undisturbed_level(phi: FloatArray, sigma: FloatArray, cells: np.ndarray) -> tuple[float, float]:
+    good = cells & np.isfinite(phi) & (sigma > 0)
+    weight = 1 / sigma[good] ** 2
+    mean = float(np.average(phi[good], weights=weight))
+    scatter = float(np.average((phi[good] - mean) ** 2, weights=weight) / np.mean(1 / weight))
+    return mean, float(np.sqrt(max(1.0, scatter) / weight.sum()))
+
+
+def _check_grey(
+    stack: SliceStack, scan: Scan, surface: Surface, hidden: Callable, level: float, sample: float | None
+) -> GreyCheck:
+    top = 2**scan.bits - 1
+    at_zero = at_top = seen = air_zero = air_seen = 0
+    for k in range(0, stack.count, max(1, stack.count // 60)):
+        image, mask = stack.slice(k), hidden(k, (0.0, 0.0))
+        free = image if mask is None else image[~mask]
+        at_zero, at_top, seen = at_zero + (free == 0).sum(), at_top + (free >= top).sum(), seen + free.size
+        if k < surface.row - 5:
+            air_zero, air_seen = air_zero + (free == 0).sum(), air_seen + free.size
+    solid = scan.calibration.grey_per_density * scan.calibration.density_solid
+    return GreyCheck(
+        scan.calibration.grey_air,
+        surface.air,
+        (surface.air - scan.calibration.grey_air) / solid,
+        float("nan") if sample is None else sample / (level * (1 - (surface.air - scan.calibration.grey_air) / solid / level)),
+        max(at_zero / seen, air_zero / max(air_seen, 1)),
+        at_top / seen,
+    )
+
+
+def _grey_warnings(
+    grey: GreyCheck, surface: Surface, bead: Bead, scan: Scan, level: float, level_sigma: float
+) -> list[str]:
+    warnings = []
+    if grey.clipped > 0.01:
+        warnings.append(f"{grey.clipped:.1%} of the air or dust voxels sit at grey 0: air is clipped, its mean reads high")
+    if grey.saturated > 0.001:
+        warnings.append(f"{grey.saturated:.2%} of the voxels outside the bead sit at the top of the range")
+    if bead.saturated:
+        warnings.append("the bead is saturated: its own density cannot be read")
+    if abs(grey.filling_factor_air) > 0.003:
+        warnings.append(
+            f"air reads a filling factor of {grey.filling_factor_air:+.4f}; grey_air is {grey.grey_air_stated:g}, measured {grey.grey_air:.2f}"
+        )
+    if np.isfinite(grey.scale_air_dust) and abs(grey.scale_air_dust - 1) > 0.03:
+        warnings.append(
+            f"undisturbed dust reads {level:.4f}; air and the stated sample would scale it by {grey.scale_air_dust:.3f}"
+        )
+    if scan.bits == 8 and surface.dust_scatter < 0.5:
+        warnings.append("8-bit slices with less noise than half a grey level: filling factors come in steps")
+    return warnings

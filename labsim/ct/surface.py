@@ -1,0 +1,88 @@
+"""The undisturbed surface of the dust, from slices far from the axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import MeasurementError
+from ..records import FloatArray
+from .stack import SliceStack
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Free surface far from the bead. ``row`` is its slice number (whole numbers are slice centres).
+
+    tilt : rad, of a plane through four quadrants; width : voxels, standard deviation of the step across it;
+    air, dust : grey levels above and below; air_scatter, dust_scatter : grey, voxel to voxel.
+    """
+
+    row: float
+    row_sigma: float
+    tilt: float
+    width: float
+    air: float
+    dust: float
+    air_scatter: float
+    dust_scatter: float
+
+
+def find_surface(stack: SliceStack, axis: tuple[float, float], bead_row: float, bead_radius: float) -> Surface:
+    """Half level between air and dust in the corners and the rim of the slices, outside 3.3 bead radii from the axis.
+
+    Raises MeasurementError: a stack upside down, or one that shows no surface.
+    """
+    ny, nx = stack.shape
+    y, x = np.mgrid[:ny, :nx]
+    distance = np.hypot(x - axis[0], y - axis[1])
+    reach = min(axis[0], axis[1], nx - 1 - axis[0], ny - 1 - axis[1])
+    far = distance > min(3.3 * bead_radius, 0.85 * reach)
+    quadrants = [far & ((x > axis[0]) == right) & ((y > axis[1]) == lower) for right in (0, 1) for lower in (0, 1)]
+    if min(q.sum() for q in quadrants) < 30:
+        raise MeasurementError(
+            stack.source, "scan.slices", "no dust far from the bead is in view on one side; export wider slices"
+        )
+    profile = np.array([[image[q].mean() for q in quadrants] for image in stack])
+    mean = profile.mean(1)
+    edge = max(2, stack.count // 30)
+    above, below = float(mean[:edge].mean()), float(mean[-edge:].mean())
+    scatter = float(np.std(np.diff(stack.slice(stack.count - 1)[far].astype(float))) / np.sqrt(2)) + 1e-9
+    if above > below + 0.5 * scatter:
+        raise MeasurementError(
+            stack.source,
+            "scan.first_slice",
+            "dust lies above and air below: the stack is upside down; put the other one of \"top\" and \"bottom\"",
+        )
+    level = 0.5 * (above + below)
+    crossings = np.flatnonzero((mean[:-1] < level) & (mean[1:] >= level))
+    if below - above < 0.5 * scatter or len(crossings) == 0:
+        raise MeasurementError(
+            stack.source, "scan.slices", "no surface between air and dust; export the slices above the dust as well"
+        )
+    rows = np.array([_cross(profile[:, q], level, int(crossings[0])) for q in range(4)])
+    first = int(crossings[0])
+    air_rows, dust_rows = mean[: max(1, first - 3)], mean[first + 5 :]
+    air, dust = float(np.mean(air_rows)), float(np.median(dust_rows))
+    # a second, sharper crossing with the levels of the whole stack, not of its ends
+    row = _cross(mean, 0.5 * (air + dust), first)
+    gx = 0.5 * (rows[2] + rows[3] - rows[0] - rows[1])
+    gy = 0.5 * (rows[1] + rows[3] - rows[0] - rows[2])
+    arm = 2 * np.mean(np.abs(x - axis[0])[far])
+    step = np.clip(np.diff(mean[max(0, first - 6) : first + 8]) / (dust - air), 0, None)
+    position = np.arange(len(step))
+    centre = (step * position).sum() / step.sum()
+    width = float(np.sqrt((step * (position - centre) ** 2).sum() / step.sum()))
+    air_scatter = float(stack.slice(0)[far].std())
+    dust_scatter = float(stack.slice(stack.count - 1)[far].std())
+    row_sigma = float(max(rows.std(ddof=1) / 2, 0.01))
+    return Surface(row, row_sigma, float(np.hypot(gx, gy) / arm), width, air, dust, air_scatter, dust_scatter)
+
+
+def _cross(profile: FloatArray, level: float, near: int) -> float:
+    crossings = np.flatnonzero((profile[:-1] < level) & (profile[1:] >= level))
+    if len(crossings) == 0:
+        return float("nan")
+    k = int(crossings[np.argmin(np.abs(crossings - near))])
+    return k + float((level - profile[k]) / (profile[k + 1] - profile[k]))
