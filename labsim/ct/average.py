@@ -123,7 +123,9 @@ def estimate_errors(sums: SectorSums, undisturbed: np.ndarray) -> CellErrors:
     with np.errstate(invalid="ignore", divide="ignore"):
         model = a + b / n
         freedom = np.where(m > 2, m - 1, 0)
-        sigma = np.sqrt((freedom * np.nan_to_num(jackknife) + MODEL_WEIGHT * model) / (freedom + MODEL_WEIGHT))
+        sigma = np.sqrt(
+            (freedom * np.nan_to_num(jackknife) + MODEL_WEIGHT * model) / (freedom + MODEL_WEIGHT)
+        )
     sigma[n == 0] = np.nan
     high = np.where(used, sector_mean, -np.inf).max(2)
     low = np.where(used, sector_mean, np.inf).min(2)
@@ -135,7 +137,9 @@ def estimate_errors(sums: SectorSums, undisturbed: np.ndarray) -> CellErrors:
 
 
 def _lag(white: FloatArray, axis: int) -> float:
-    first, second = (np.take(white, range(*span), axis) for span in ((0, white.shape[axis] - 1), (1, white.shape[axis])))
+    first, second = (
+        np.take(white, range(*span), axis) for span in ((0, white.shape[axis] - 1), (1, white.shape[axis]))
+    )
     both = np.isfinite(first) & np.isfinite(second)
     if both.sum() < 30:
         return float("nan")
@@ -155,7 +159,13 @@ def fit_tilt(
     slope = np.gradient(mean, r, axis=1)
     angle = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS) - np.pi
     arm = (rows - bead_row)[:, None]
-    full = (sums.masked.sum(2) == 0) & (sums.count.min(2) > 0) & (arm > 0) & (r[None, :] < r_max) & np.isfinite(slope)
+    full = (
+        (sums.masked.sum(2) == 0)
+        & (sums.count.min(2) > 0)
+        & (arm > 0)
+        & (r[None, :] < r_max)
+        & np.isfinite(slope)
+    )
     if full.sum() < 10:
         return (0.0, 0.0), float("inf")
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -167,5 +177,7 @@ def fit_tilt(
     for wave in (np.cos(angle), np.sin(angle)):
         expected = -(slope * arm)[full][:, None] * wave * shrink
         information = float((weight * expected**2).sum())
-        tilt.append(float((weight * expected * residual[full]).sum() / information) if information > 0 else 0.0)
+        tilt.append(
+            float((weight * expected * residual[full]).sum() / information) if information > 0 else 0.0
+        )
     return (tilt[0], tilt[1]), information**-0.5 if information > 0 else float("inf")

@@ -63,7 +63,9 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
         points, outside, used = _edge_points(box, fit, directions, radius, level, top)
         if used.sum() < 60:
             raise MeasurementError(
-                scan.slices, "projectile.radius_mm", "the bead has no round edge; check radius_mm and voxel_um"
+                scan.slices,
+                "projectile.radius_mm",
+                "the bead has no round edge; check radius_mm and voxel_um",
             )
         fit, radius, rms = _fit_sphere(points[used])
     if abs(radius / stated - 1) > 0.15:
@@ -75,10 +77,13 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
     warnings = []
     # half of the bead's own level cannot be seen where it is clipped: the radius reads up to 4 % small there
     if abs(radius / stated - 1) > (0.05 if saturated else 0.03):
-        warnings.append(f"the bead's radius is {radius:.2f} voxels but {stated:.2f} are stated: voxel size or radius is off")
+        warnings.append(
+            f"the bead's radius is {radius:.2f} voxels but {stated:.2f} are stated: voxel size or radius is off"
+        )
     tree = cKDTree(directions)
     lateral, axial = (
-        _fit_blur(box, fit, radius, level, top, directions, outside, tree, region) for region in ("lateral", "axial")
+        _fit_blur(box, fit, radius, level, top, directions, outside, tree, region)
+        for region in ("lateral", "axial")
     )
     x, y, k = (fit + origin).tolist()
     return Bead((x, y, k), radius, stated, rms, lateral, axial, saturated, tuple(warnings))
@@ -92,7 +97,9 @@ def _bead_level(scan: Scan) -> float:
     return scan.calibration.grey_air + scan.calibration.grey_per_density * density
 
 
-def _find_coarsely(stack: SliceStack, scan: Scan, threshold: float, stated: float) -> tuple[float, float, float]:
+def _find_coarsely(
+    stack: SliceStack, scan: Scan, threshold: float, stated: float
+) -> tuple[float, float, float]:
     ny, nx = stack.shape
     # a block holds at least a few voxels but stays well below the bead's radius
     step = max(1, min(int(np.ceil(max(ny, nx, stack.count) / COARSE)), int(stated / 3)))
@@ -124,7 +131,9 @@ def _find_coarsely(stack: SliceStack, scan: Scan, threshold: float, stated: floa
     rod = scan.projectile.tip != "sphere"
     if (low[1:] < 1).any() or beyond.any() or (low[0] < 1 and not rod):
         raise MeasurementError(
-            scan.slices, "scan.slices", "the bead is cut by the edge of the stack; export slices that hold all of it"
+            scan.slices,
+            "scan.slices",
+            "the bead is cut by the edge of the stack; export slices that hold all of it",
         )
     k, y, x = (found.mean(0) + 0.5) * step - 0.5
     if rod:
@@ -132,7 +141,9 @@ def _find_coarsely(stack: SliceStack, scan: Scan, threshold: float, stated: floa
     return float(x), float(y), float(k)
 
 
-def _cut_box(stack: SliceStack, centre: tuple[float, float, float], half: int) -> tuple[FloatArray, FloatArray]:
+def _cut_box(
+    stack: SliceStack, centre: tuple[float, float, float], half: int
+) -> tuple[FloatArray, FloatArray]:
     """Cube about the centre as (x, y, k) float32 and the index of its corner; cut at the stack's edges."""
     ny, nx = stack.shape
     low = [max(0, round(c) - half) for c in centre]
@@ -160,7 +171,9 @@ def _edge_points(
     """Half-maximum point of every ray, the level outside of it, and which rays have one."""
     along = np.arange(max(0.4 * radius, radius - 5), radius + 4.6, 0.1)
     points = middle + along[None, :, None] * directions[:, None, :]
-    grey = ndimage.map_coordinates(box, points.reshape(-1, 3).T, order=1, mode="nearest").reshape(len(directions), -1)
+    grey = ndimage.map_coordinates(box, points.reshape(-1, 3).T, order=1, mode="nearest").reshape(
+        len(directions), -1
+    )
     outside = grey[:, along > radius + 2.5].mean(1)
     half = np.minimum(0.5 * (outside + level), 0.95 * top)[:, None]
     below = grey < half
@@ -183,7 +196,9 @@ def _fit_sphere(points: FloatArray) -> tuple[FloatArray, float, float]:
         a = np.column_stack([2 * p, np.ones(len(p))])
         solution = np.linalg.lstsq(a, (p**2).sum(1), rcond=None)[0]
         start = np.append(solution[:3], np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-9)))
-        fit = least_squares(lambda q, p=p: np.linalg.norm(p - q[:3], axis=1) - q[3], start, loss="soft_l1", f_scale=0.3)
+        fit = least_squares(
+            lambda q, p=p: np.linalg.norm(p - q[:3], axis=1) - q[3], start, loss="soft_l1", f_scale=0.3
+        )
         centre, radius = fit.x[:3], float(fit.x[3])
         residual = np.linalg.norm(points - centre, axis=1) - radius
         rms = float(np.sqrt(np.mean(residual[keep] ** 2)))
@@ -212,5 +227,11 @@ def _fit_blur(
         share = 0.5 * erfc((d - q[1]) / (np.sqrt(2) * q[0]))
         return np.minimum(background + (q[2] * level - background) * share, top) - grey
 
-    fit = least_squares(misfit, [0.7, radius, 1.0], bounds=([0.05, radius - 1, 0.7], [4, radius + 1, 1.4]), loss="soft_l1", f_scale=15)
+    fit = least_squares(
+        misfit,
+        [0.7, radius, 1.0],
+        bounds=([0.05, radius - 1, 0.7], [4, radius + 1, 1.4]),
+        loss="soft_l1",
+        f_scale=15,
+    )
     return float(fit.x[0])

@@ -15,7 +15,7 @@ DRAWS = 200
 def cell_volumes(scan_map: FillingMap) -> FloatArray:
     """m^3 of every cell, (nz, nr): rings of the map's own edges."""
     dr, dz = _edge(scan_map.r), _edge(-scan_map.z)
-    return np.broadcast_to(2 * np.pi * scan_map.r * dr * dz, scan_map.filling_factor.shape)
+    return dz[:, None] * (2 * np.pi * scan_map.r * dr)[None, :]
 
 
 def compress(
@@ -97,7 +97,6 @@ def balance_mass(scan_map: FillingMap, undisturbed: float) -> MassLedger:
     finite = np.isfinite(phi)
     below = finite & (scan_map.z < -0.5 * _edge(-scan_map.z)[0])[:, None]
     excess = np.where(below, (phi - undisturbed) * volumes, 0.0) / undisturbed
-    gained, lost = excess[excess > 0].sum(), -excess[excess < 0].sum()
     above = finite & (scan_map.z > 3 * _edge(-scan_map.z)[0])[:, None]
     # noise does not cancel in a sum of the positive parts alone: only cells beyond 3 sigma are told apart
     sure = np.abs(phi - undisturbed) > 3 * np.nan_to_num(sigma, nan=np.inf)
@@ -107,7 +106,6 @@ def balance_mass(scan_map: FillingMap, undisturbed: float) -> MassLedger:
     r, h = scan_map.bead_radius, min(scan_map.tip_depth, 2 * scan_map.bead_radius)
     cap = np.pi * h * h * (3 * r - h) / 3
     spread = float(np.sqrt(np.nansum((np.where(below, sigma, 0.0) * volumes / undisturbed) ** 2)))
-    del gained, lost
     return MassLedger(cap + float(crater), float(net + crater), heaped, spread)
 
 

@@ -50,7 +50,11 @@ def project(
     deposit = _deposit(r - half_r, r + half_r, z - half_z, z + half_z, mass, edges_r, edges_z)
     if blur > 0:
         across, along = _blur_matrices(
-            float(edges_r[1] - edges_r[0]), len(edges_r) - 1, float(edges_z[1] - edges_z[0]), len(edges_z) - 1, float(blur)
+            float(edges_r[1] - edges_r[0]),
+            len(edges_r) - 1,
+            float(edges_z[1] - edges_z[0]),
+            len(edges_z) - 1,
+            float(blur),
         )
         deposit = along @ deposit @ across
     nz, nr = scan_map.filling_factor.shape
@@ -117,18 +121,22 @@ def _deposit(
 
 
 @lru_cache(maxsize=32)
-def _blur_matrices(step_r: float, nr: int, step_z: float, nz: int, blur: float) -> tuple[FloatArray, FloatArray]:
+def _blur_matrices(
+    step_r: float, nr: int, step_z: float, nz: int, blur: float
+) -> tuple[FloatArray, FloatArray]:
     """Right factor (nr, nr) for r and left factor (nz, nz) for z; rows (columns) sum to 1, so mass stays.
 
-    Around an axis a Gaussian spreads a ring at r' to exp(-(r - r')^2 / 2 s^2) I0e(r r' / s^2) r dr / s^2. At the outer
-    edges, and below, what leaves comes back as from a mirror: the frame is cut from a larger body of dust.
+    Around an axis a Gaussian spreads a ring at r' to exp(-(r - r')^2 / 2 s^2) I0e(r r' / s^2) r dr / s^2. The factors are
+    balanced (Sinkhorn) so that mass stays and a uniform body stays uniform; the frame's outer edge acts like a mirror.
     """
-    r = (np.arange(nr + int(6 * blur / step_r) + 2) + 0.5) * step_r
-    spread = np.exp(-((r[None, :] - r[:nr, None]) ** 2) / (2 * blur**2)) * ive(0, r[None, :] * r[:nr, None] / blur**2) * r[None, :]
-    spread /= spread.sum(1, keepdims=True)
-    extra = spread[:, nr:]
-    spread = spread[:, :nr].copy()
-    spread[:, nr - 1 : nr - 1 - extra.shape[1] : -1] += extra[:, : min(extra.shape[1], nr - 1)]
+    r = (np.arange(nr) + 0.5) * step_r
+    kernel = np.exp(-((r[None, :] - r[:, None]) ** 2) / (2 * blur**2)) * ive(
+        0, r[None, :] * r[:, None] / blur**2
+    )
+    balance = np.full(nr, 1 / np.sqrt((kernel * r[None, :]).sum(1).max()))
+    for _ in range(200):
+        balance = np.sqrt(balance / (kernel @ (balance * r)))
+    spread = balance[:, None] * kernel * (balance * r)[None, :]
     spread /= spread.sum(1, keepdims=True)
     z = np.arange(nz) * step_z
     along = np.exp(-((z[:, None] - z[None, :]) ** 2) / (2 * blur**2))

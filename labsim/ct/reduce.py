@@ -110,7 +110,9 @@ def reduce_scan(
     if correct:
         cupping = fit_cupping(stack, (x, y), bead, surface)
         if cupping.followed:
-            warnings.append(f"cupping removed: {cupping.amount / (surface.dust - surface.air):.1%} of the dust's level")
+            warnings.append(
+                f"cupping removed: {cupping.amount / (surface.dust - surface.air):.1%} of the dust's level"
+            )
 
     def average(tilt: tuple[float, float], rings_too: bool = True) -> tuple[SectorAverage, float]:
         sums = SectorAverage((ny, nx), stack.count, (x, y, k_bead), cell, reach, tilt)
@@ -141,7 +143,13 @@ def reduce_scan(
     if followed:
         for _ in range(2):
             sums, ring_rms = average(tilt)
-            more, _ = fit_tilt(sums.sums(), estimate_errors(sums.sums(), undisturbed_cells), k_bead, rows, 3.0 * bead.stated_radius)
+            more, _ = fit_tilt(
+                sums.sums(),
+                estimate_errors(sums.sums(), undisturbed_cells),
+                k_bead,
+                rows,
+                3.0 * bead.stated_radius,
+            )
             tilt = (tilt[0] + more[0], tilt[1] + more[1])
         sums, ring_rms = average(tilt)
         errors = estimate_errors(sums.sums(), undisturbed_cells)
@@ -156,7 +164,13 @@ def reduce_scan(
     tip_depth = (k_bead + bead.stated_radius - surface.row) * voxel
     rod = scan.projectile.tip != "sphere"
     masked = mask_near_bead(
-        r, z, cell * voxel, -tip_depth + scan.projectile.tip_radius, scan.projectile.tip_radius, guard * voxel, rod=rod
+        r,
+        z,
+        cell * voxel,
+        -tip_depth + scan.projectile.tip_radius,
+        scan.projectile.tip_radius,
+        guard * voxel,
+        rod=rod,
     )
     phi[masked], sigma[masked] = np.nan, np.nan
     level, level_sigma = _undisturbed_level(phi, sigma, undisturbed_cells & ~masked)
@@ -168,9 +182,19 @@ def reduce_scan(
             f"gives a filling factor of {level:.3f} for the undisturbed dust; it must lie between 0 and 1",
         )  # fmt: skip
     if surface.tilt > np.deg2rad(1.5):
-        warnings.append(f"the dust's surface leans by {np.rad2deg(surface.tilt):.1f} degrees against the slices")
+        warnings.append(
+            f"the dust's surface leans by {np.rad2deg(surface.tilt):.1f} degrees against the slices"
+        )
     filling = FillingMap(
-        r, z, phi, sigma, np.where(masked, 0, count), tip_depth, scan.projectile.tip_radius, (x, y), tuple(warnings)
+        r,
+        z,
+        phi,
+        sigma,
+        np.where(masked, 0, count),
+        tip_depth,
+        scan.projectile.tip_radius,
+        (x, y),
+        tuple(warnings),
     )
     report(4, 4, "map")
     return ReducedScan(
@@ -193,19 +217,32 @@ def check_levels(stack: SliceStack, scan: Scan) -> None:
     top = 2**scan.bits - 1
     if stack.dtype.kind in "ui" and scan.bits > 8 * stack.dtype.itemsize:
         raise MeasurementError(
-            scan.slices, "scan.bits", f"is {scan.bits} but the slices have {8 * stack.dtype.itemsize}; correct scan.toml"
+            scan.slices,
+            "scan.bits",
+            f"is {scan.bits} but the slices have {8 * stack.dtype.itemsize}; correct scan.toml",
         )
     brightest = max(float(stack.slice(k).max()) for k in range(0, stack.count, max(1, stack.count // 40)))
     if stack.dtype.kind in "ui" and brightest > top:
         raise MeasurementError(
-            scan.slices, "scan.bits", f"is {scan.bits} but a slice holds grey level {brightest:.0f}; correct scan.toml"
+            scan.slices,
+            "scan.bits",
+            f"is {scan.bits} but a slice holds grey level {brightest:.0f}; correct scan.toml",
         )
     if scan.calibration.grey_per_density <= 0:
-        raise MeasurementError(scan.slices, "calibration.grey_per_density", "must be positive: denser is brighter")
+        raise MeasurementError(
+            scan.slices, "calibration.grey_per_density", "must be positive: denser is brighter"
+        )
 
 
 def mask_near_bead(
-    r: FloatArray, z: FloatArray, cell: float, bead_centre_z: float, bead_radius: float, guard: float, *, rod: bool = False
+    r: FloatArray,
+    z: FloatArray,
+    cell: float,
+    bead_centre_z: float,
+    bead_radius: float,
+    guard: float,
+    *,
+    rod: bool = False,
 ) -> np.ndarray:
     """Cells (nz, nr) that come closer to the measured bead than the guard: True where nothing is to be compared.
 
@@ -248,7 +285,9 @@ def _undisturbed_cells(sums: SectorAverage, rows: FloatArray, bead: Bead, surfac
     cells = below if below.sum() > 60 else deep
     if cells.sum() < 30:
         raise MeasurementError(
-            "scan", "scan.slices", "no undisturbed dust is in view (3.5 bead radii away); export more slices below the bead"
+            "scan",
+            "scan.slices",
+            "no undisturbed dust is in view (3.5 bead radii away); export more slices below the bead",
         )
     return cells
 
@@ -277,7 +316,9 @@ def _check_grey(
         scan.calibration.grey_air,
         surface.air,
         (surface.air - scan.calibration.grey_air) / solid,
-        float("nan") if sample is None else sample / (level * (1 - (surface.air - scan.calibration.grey_air) / solid / level)),
+        float("nan")
+        if sample is None
+        else sample / (level * (1 - (surface.air - scan.calibration.grey_air) / solid / level)),
         max(at_zero / seen, air_zero / max(air_seen, 1)),
         at_top / seen,
     )
@@ -288,7 +329,9 @@ def _grey_warnings(
 ) -> list[str]:
     warnings = []
     if grey.clipped > 0.01:
-        warnings.append(f"{grey.clipped:.1%} of the air or dust voxels sit at grey 0: air is clipped, its mean reads high")
+        warnings.append(
+            f"{grey.clipped:.1%} of the air or dust voxels sit at grey 0: air is clipped, its mean reads high"
+        )
     if grey.saturated > 0.001:
         warnings.append(f"{grey.saturated:.2%} of the voxels outside the bead sit at the top of the range")
     if bead.saturated:

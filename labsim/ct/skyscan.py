@@ -93,7 +93,9 @@ def read_log(path: Path) -> SkyScanLog:
             key = " ".join(key.lower().split())
             current.setdefault(SPELLINGS.get(key, key), value.strip())
     if not sections:
-        raise MeasurementError(path, "", "has no [section]; it is not a SkyScan log, move it out of the folder")
+        raise MeasurementError(
+            path, "", "has no [section]; it is not a SkyScan log, move it out of the folder"
+        )
     return SkyScanLog(path, sections)
 
 
@@ -102,7 +104,9 @@ def check_log(log: SkyScanLog, count: int, shape: tuple[int, int], dtype: np.dty
     stated = log.number("sections count", "reconstruction")
     if stated is not None and int(stated) != count:
         raise MeasurementError(
-            log.path, "Sections Count", f"is {int(stated)} but there are {count} slices; put the missing ones back"
+            log.path,
+            "Sections Count",
+            f"is {int(stated)} but there are {count} slices; put the missing ones back",
         )
     for key, size in (("result image width (pixels)", shape[1]), ("result image height (pixels)", shape[0])):
         value = log.number(key, "reconstruction")

@@ -78,5 +78,7 @@ def open_stack(path: Path | str) -> SliceStack:
         if module.recognise(path):
             return module.open_stack(path)
     raise MeasurementError(
-        path, "scan.slices", f"holds no slices in a known format ({', '.join(names)}); export 8- or 16-bit TIFF"
+        path,
+        "scan.slices",
+        f"holds no slices in a known format ({', '.join(names)}); export 8- or 16-bit TIFF",
     )

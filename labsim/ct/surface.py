@@ -29,7 +29,9 @@ class Surface:
     dust_scatter: float
 
 
-def find_surface(stack: SliceStack, axis: tuple[float, float], bead_row: float, bead_radius: float) -> Surface:
+def find_surface(
+    stack: SliceStack, axis: tuple[float, float], bead_row: float, bead_radius: float
+) -> Surface:
     """Half level between air and dust in the corners and the rim of the slices, outside 3.3 bead radii from the axis.
 
     Raises MeasurementError: a stack upside down, or one that shows no surface.
@@ -39,10 +41,14 @@ def find_surface(stack: SliceStack, axis: tuple[float, float], bead_row: float, 
     distance = np.hypot(x - axis[0], y - axis[1])
     reach = min(axis[0], axis[1], nx - 1 - axis[0], ny - 1 - axis[1])
     far = distance > min(3.3 * bead_radius, 0.85 * reach)
-    quadrants = [far & ((x > axis[0]) == right) & ((y > axis[1]) == lower) for right in (0, 1) for lower in (0, 1)]
+    quadrants = [
+        far & ((x > axis[0]) == right) & ((y > axis[1]) == lower) for right in (0, 1) for lower in (0, 1)
+    ]
     if min(q.sum() for q in quadrants) < 30:
         raise MeasurementError(
-            stack.source, "scan.slices", "no dust far from the bead is in view on one side; export wider slices"
+            stack.source,
+            "scan.slices",
+            "no dust far from the bead is in view on one side; export wider slices",
         )
     profile = np.array([[image[q].mean() for q in quadrants] for image in stack])
     mean = profile.mean(1)
@@ -53,13 +59,15 @@ def find_surface(stack: SliceStack, axis: tuple[float, float], bead_row: float, 
         raise MeasurementError(
             stack.source,
             "scan.first_slice",
-            "dust lies above and air below: the stack is upside down; put the other one of \"top\" and \"bottom\"",
+            'dust lies above and air below: the stack is upside down; put the other one of "top" and "bottom"',
         )
     level = 0.5 * (above + below)
     crossings = np.flatnonzero((mean[:-1] < level) & (mean[1:] >= level))
     if below - above < 0.5 * scatter or len(crossings) == 0:
         raise MeasurementError(
-            stack.source, "scan.slices", "no surface between air and dust; export the slices above the dust as well"
+            stack.source,
+            "scan.slices",
+            "no surface between air and dust; export the slices above the dust as well",
         )
     rows = np.array([_cross(profile[:, q], level, int(crossings[0])) for q in range(4)])
     first = int(crossings[0])

@@ -30,7 +30,9 @@ def open_stack(path: Path) -> SliceStack:
             path, "exchange/data", "holds projections, not slices; labsim.ct.reconstruct makes slices of them"
         )
     if data.ndim != 3 or data.shape[0] < 8:
-        raise MeasurementError(path, "exchange/data", f"has shape {data.shape}; (slices >= 8, rows, columns) is needed")
+        raise MeasurementError(
+            path, "exchange/data", f"has shape {data.shape}; (slices >= 8, rows, columns) is needed"
+        )
     voxel = data.attrs.get("voxel_m")
     return SliceStack(
         path, data.shape[0], data.shape[1:], data.dtype, lambda k: data[k],

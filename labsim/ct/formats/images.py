@@ -34,7 +34,9 @@ def open_stack(path: Path) -> SliceStack:
         voxel = log.voxel
         facts["log"] = log.sections
         facts["slice_spacing"] = log.slice_spacing
-    return SliceStack(path, len(files), first.shape, first.dtype, lambda k: read_image(files[k]), voxel, facts, warnings)
+    return SliceStack(
+        path, len(files), first.shape, first.dtype, lambda k: read_image(files[k]), voxel, facts, warnings
+    )
 
 
 def read_image(file: Path) -> np.ndarray:
@@ -63,7 +65,11 @@ def read_rescale(file: Path) -> dict:
     if file.suffix.lower() not in (".tif", ".tiff"):
         return {}
     with tifffile.TiffFile(file) as tiff:
-        text = str(tiff.pages[0].tags["ImageDescription"].value) if "ImageDescription" in tiff.pages[0].tags else ""
+        text = (
+            str(tiff.pages[0].tags["ImageDescription"].value)
+            if "ImageDescription" in tiff.pages[0].tags
+            else ""
+        )
     found = {}
     for name in ("slope", "offset"):
         match = re.search(rf"{name}\W+([-+0-9.eE]+)", text, re.IGNORECASE)
@@ -73,7 +79,9 @@ def read_rescale(file: Path) -> dict:
 
 
 def _list_slices(folder: Path) -> list[Path]:
-    images = [item for item in folder.iterdir() if item.suffix.lower() in SUFFIXES and not item.name.startswith(".")]
+    images = [
+        item for item in folder.iterdir() if item.suffix.lower() in SUFFIXES and not item.name.startswith(".")
+    ]
     suffix = Counter(item.suffix.lower() for item in images).most_common(1)[0][0]
     numbered: dict[str, list[tuple[int, Path]]] = {}
     for item in images:
@@ -81,7 +89,9 @@ def _list_slices(folder: Path) -> list[Path]:
         if match and item.suffix.lower() == suffix:  # other names are previews, such as NRecon's _spr.bmp
             numbered.setdefault(match.group(1), []).append((int(match.group(2)), item))
     if not numbered:
-        raise MeasurementError(folder, "scan.slices", "no image has a number at the end of its name; number the slices")
+        raise MeasurementError(
+            folder, "scan.slices", "no image has a number at the end of its name; number the slices"
+        )
     slices = sorted(max(numbered.values(), key=len))
     if len(slices) < 8:
         raise MeasurementError(folder, "scan.slices", f"only {len(slices)} slices; a scan needs 8 or more")

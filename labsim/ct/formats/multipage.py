@@ -23,8 +23,12 @@ def open_stack(path: Path) -> SliceStack:
     except Exception as trouble:
         raise MeasurementError(path, "scan.slices", f"is not a readable TIFF ({trouble})") from None
     if len(shape) != 3 or shape[0] < 8:
-        raise MeasurementError(path, "scan.slices", f"holds an array of shape {shape}; 8 or more grey pages are needed")
+        raise MeasurementError(
+            path, "scan.slices", f"holds an array of shape {shape}; 8 or more grey pages are needed"
+        )
     if pages == shape[0]:
-        return SliceStack(path, shape[0], shape[1:], dtype, lambda k: tifffile.imread(path, key=k), facts={"format": "tiff"})
+        return SliceStack(
+            path, shape[0], shape[1:], dtype, lambda k: tifffile.imread(path, key=k), facts={"format": "tiff"}
+        )
     volume = tifffile.memmap(path, mode="r")  # ImageJ's contiguous stacks have one page for all slices
     return SliceStack(path, shape[0], shape[1:], dtype, lambda k: volume[k], facts={"format": "tiff"})

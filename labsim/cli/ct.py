@@ -1,0 +1,75 @@
+"""``labsim ct SCAN``: slices to the filling-factor map, its compacted volume and their pictures."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import CampaignError
+from .options import AsJson, Out, Quiet, finish, make_output_folder, show_progress, write_json
+
+
+def ct(
+    scan: Annotated[Path, typer.Argument(help="Folder of one scan, with its scan.toml.")],
+    out: Out = None,
+    cell: Annotated[int, typer.Option("--cell", min=1, max=20, help="Voxels along an edge of a cell.")] = 2,
+    guard: Annotated[
+        float, typer.Option("--guard", min=0, help="Voxels about the bead that are left out.")
+    ] = 3.0,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Reduce a CT scan: slices to an axisymmetric map of the filling factor and its compacted volume."""
+    from ..campaign import read_campaign, read_scan
+    from ..ct import compress, reduce_scan, summarise_scan, write_compressed, write_map
+    from ..records import Scan
+    from ..report.map_figures import draw_compressed, draw_map
+
+    began = time.perf_counter()
+    record = read_scan(scan)
+    if not isinstance(record, Scan):
+        raise CampaignError(
+            scan, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
+        )
+    folder = scan.resolve() if scan.is_dir() else scan.resolve().parent
+    campaign = folder.parent.parent
+    sample = read_campaign(campaign).sample.filling_factor if (campaign / "campaign.toml").is_file() else None
+    with show_progress(quiet) as progress:
+        reduced = reduce_scan(
+            record, cell=cell, guard=guard, sample_filling_factor=sample,
+            progress=lambda done, total, text: progress(done, total, text),
+        )  # fmt: skip
+    curve = compress(reduced.map)
+    summary = summarise_scan(reduced, curve)
+    summary["wall_s"] = time.perf_counter() - began
+    target = make_output_folder(out, scan, "ct")
+    write_map(reduced, target / "map.nc")
+    write_compressed(curve, target / "compressed_volume.csv")
+    draw_map(reduced.map, reduced.undisturbed.value, target / "map.png", record.name)
+    draw_compressed(curve, target / "compressed_volume.png", record.name)
+    write_json(target / "scan.json", summary)
+    finish({**summary, "out": str(target)}, describe(summary, target), as_json=as_json, quiet=quiet)
+
+
+def describe(summary: dict, target: Path) -> str:
+    """What a person reads at the end."""
+    x, y = summary["axis_px"]
+    sphere = summary["normalisation"]["sphere_volume_m3"]
+    sigma = summary["compacted_volume_sigma_m3"]
+    ledger = summary["mass_ledger_m3"]
+    lines = [
+        f"axis at pixel ({x:.2f}, {y:.2f}), leaning {1e3 * summary['tilt_rad'][0]:+.1f}, {1e3 * summary['tilt_rad'][1]:+.1f} mrad "
+        f"(± {1e3 * summary['tilt_sigma_rad']:.1f})",
+        f"tip {summary['tip_depth_m'] * 1e3:.3f} mm below the undisturbed surface",
+        f"undisturbed filling factor {summary['filling_factor_undisturbed']:.5f} ± {summary['filling_factor_undisturbed_sigma']:.5f}",
+        f"denser than 0.20: {summary['compacted_volume_m3'] * 1e9:.3f} ± {sigma * 1e9:.3f} mm³ = "
+        f"{summary['compacted_volume_sphere_volumes']:.2f} ± {sigma / sphere:.2f} sphere volumes",
+        f"voxel noise {summary['voxel_noise']:.4f}, point spread {summary['blur_m'] * 1e6:.0f} µm",
+        f"dust displaced {ledger['displaced'] * 1e9:.3f} mm³, found compacted {ledger['compacted'] * 1e9:.3f}, "
+        f"heaped {ledger['heaped'] * 1e9:.3f}",
+    ]
+    lines += [f"note: {text}" for text in summary["warnings"]]
+    return "\n".join([*lines, f"written to {target}"])
