@@ -124,9 +124,11 @@ def find_tip_point(template: Template, lower: bool = True) -> tuple[float, float
             q,
             bounds=([-np.inf, -np.inf, 2.0, 0.2, -0.5, 0.5], [np.inf, np.inf, 10 * w, 8.0, 0.5, 1.5]),
             x_scale=[1, 1, 1, 0.3, 0.1, 0.1],
+            loss="soft_l1",  # a reflection that crosses the edge must not pull the circle
+            f_scale=0.05,
         )
         q = found.x
-    misfit = float(np.sqrt(np.mean(found.fun**2)))
+    misfit = 1.4826 * float(np.median(np.abs(residual(q))))
     if misfit > 0.12:
         return None
     cy = q[0] if lower else h - 1 - q[0]
@@ -147,7 +149,9 @@ def find_edge(template: Template) -> tuple[float, float, float, float, float] | 
     inner = np.arange(left + max(3, (right - left) // 8), right - max(3, (right - left) // 8) + 1)
     if inner.size < 5:
         return None
-    edges = np.array([int(np.flatnonzero(solid[:, k])[0]) for k in inner])
+    if not solid[:, inner].any(axis=0).all():
+        return None
+    edges = np.argmax(solid[:, inner], axis=0)
     if np.ptp(edges) > 3 + 0.12 * inner.size:
         return None
     rows = np.arange(m.shape[0], dtype=float)
@@ -189,6 +193,8 @@ def measure_shaft(template: Template) -> tuple[float, float, float] | None:
     for r in rows:
         line = m[r]
         inside = np.flatnonzero(line > 0.5)
+        if inside.size == 0:
+            continue
         i, j = inside[0], inside[-1]
         if i == 0 or j == len(line) - 1:
             return None
@@ -196,6 +202,8 @@ def measure_shaft(template: Template) -> tuple[float, float, float] | None:
         hi = j + (line[j] - 0.5) / (line[j] - line[j + 1])
         middle.append(0.5 * (lo + hi))
         width.append(hi - lo)
+    if len(middle) < len(rows):
+        return None
     tilt = float(np.arctan(np.polyfit(rows, middle, 1)[0]))
     sigma = max(float(np.std(width)) / np.sqrt(len(width)), 0.02)
     return tilt, float(np.mean(width)) * np.cos(tilt), sigma

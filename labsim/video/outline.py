@@ -28,11 +28,10 @@ class Outliner:
 
     def __init__(self, scene: Scene) -> None:
         h, w = scene.background.shape
-        columns = np.flatnonzero(scene.swept.any(axis=0))
-        width = columns.max() - columns.min()
-        margin = 12 + width // 6
-        self.left = max(0, columns.min() - margin)
-        self.right = min(w, columns.max() + margin + 1)
+        first, last = scene.corridor
+        margin = 12 + (last - first) // 6
+        self.left = max(0, first - margin)
+        self.right = min(w, last + margin + 1)
         part = (slice(None), slice(self.left, self.right))
         self.background = scene.background[part].astype(np.float32)
         self.level = np.float32(scene.projectile_level)
@@ -46,7 +45,8 @@ class Outliner:
         self.dark = bool(np.median(lever[above]) > 0) if above.any() else True
         # the row below which nothing can be seen any more
         self.floor = np.array([np.flatnonzero(above[:, k]).max(initial=0) for k in range(above.shape[1])])
-        self.corridor = scene.swept[:, self.left : self.right].any(axis=0)
+        columns = np.arange(self.left, self.right)
+        self.corridor = (columns >= first) & (columns <= last)
 
     def find(self, picture: np.ndarray, brightness: float) -> Outline | None:
         """Outline of the largest dark body in the corridor; None where there is none."""

@@ -3,8 +3,9 @@
 The template is the opacity m (0 background, 1 projectile) of the region around one end, as cubic B-spline
 coefficients. A picture is modelled as I = a B (1 - m(p - shift)) + b m(p - shift): B the background, a its brightness, b the
 projectile's level. Shift (dy, dx), a and b are solved together by Gauss-Newton steps (Lucas & Kanade 1981), weighted
-by the noise of each pixel, with Huber weights against spray. The error bar is the element of the inverse of the 4 × 4
-Fisher matrix, so what x, a and b take away from y is in it.
+by the noise of each pixel, with Huber weights against spray. A plane is added for light that drifts
+across (glare). The error bar is the element of the inverse of the whole Fisher matrix, so what x, a, b and the plane take
+away from y is in it.
 """
 
 from __future__ import annotations
@@ -85,11 +86,13 @@ def register(
     picture, background, usable: (rows, columns) alike; ``usable`` False masks pixels (dust, dead, saturated).
     """
     h, w = template.shape
-    theta = np.array([0.0, 0.0, brightness, level])
+    theta = np.array([0.0, 0.0, brightness, level, 0.0, 0.0])
+    across = np.linspace(-1.0, 1.0, w)[None, :]
+    down = np.linspace(-1.0, 1.0, h)[:, None]
     oy, ox = round(y), round(x)
     dy, dx = y - oy, x - ox
     region = None
-    fisher = np.eye(4)
+    fisher = np.eye(6)
     chi_square = lost = np.nan
     for _ in range(steps):
         if abs(dy) > 0.6 or abs(dx) > 0.6:
@@ -105,8 +108,9 @@ def register(
             image, ground, mask, rows, columns = region
         m, my, mx = (part[rows, columns] for part in template.shifted(dy, dx))
         a, b = theta[2], theta[3]
+        plane = theta[4] * down[rows] + theta[5] * across[:, columns]
         model = a * ground * (1 - m) + b * m
-        residual = (image - model) * mask
+        residual = (image - model - plane) * mask
         weight = mask / noise.variance(model)
         full = weight
         if robust:
@@ -115,12 +119,23 @@ def register(
             huber = np.where(size > HUBER, HUBER / np.maximum(size, 1e-9), 1.0)
             weight = weight * huber
         lever = b - a * ground
-        columns_of = (lever * my, lever * mx, ground * (1 - m), m)
-        fisher = np.array([[np.sum(weight * p * q) for q in columns_of] for p in columns_of])
-        right = np.array([np.sum(weight * p * residual) for p in columns_of])
+        by_y = lever * my
+        slopes = np.stack(
+            [
+                by_y,
+                lever * mx,
+                ground * (1 - m),
+                m,
+                np.broadcast_to(down[rows], m.shape),
+                np.broadcast_to(across[:, columns], m.shape),
+            ]
+        ).reshape(6, -1)
+        weighted = slopes * weight.ravel()
+        fisher = weighted @ slopes.T
+        right = weighted @ residual.ravel()
         scale = np.sqrt(np.diag(fisher)) + 1e-12
         try:
-            step = np.linalg.solve(fisher / np.outer(scale, scale) + 1e-9 * np.eye(4), right / scale) / scale
+            step = np.linalg.solve(fisher / np.outer(scale, scale) + 1e-9 * np.eye(6), right / scale) / scale
         except np.linalg.LinAlgError:
             return None
         jump = max(abs(step[0]), abs(step[1]))
@@ -129,9 +144,9 @@ def register(
         dy, dx = dy + step[0], dx + step[1]
         theta[2:] += step[2:]
         pixels = mask.sum()
-        chi_square = float(np.sum(weight * residual**2) / max(pixels - 4, 1))
-        sensitive = full * columns_of[0] ** 2
-        lost = 1.0 - float(np.sum(weight * columns_of[0] ** 2) / max(np.sum(sensitive), 1e-30))
+        chi_square = float(np.sum(weight * residual**2) / max(pixels - 6, 1))
+        sensitive = full * by_y**2
+        lost = 1.0 - float(np.sum(weight * by_y**2) / max(np.sum(sensitive), 1e-30))
         if jump < ENOUGH:
             break
     else:

@@ -35,6 +35,7 @@ class Scene:
 
     background : grey level at brightness 1; projectile_level : grey level of the projectile;
     trusted : pixels that are neither dead nor saturated; swept : pixels that the projectile passed over;
+    corridor : first and last column of the projectile's path;
     brightness : (n,) of each frame; duplicate : (n,) whether a frame repeats the one before, bit by bit;
     surface : row of the dust's surface along a column x: rows = surface[0] + surface[1] · x, None where none is seen.
     """
@@ -43,6 +44,7 @@ class Scene:
     projectile_level: float
     trusted: np.ndarray
     swept: np.ndarray
+    corridor: tuple[int, int]
     brightness: FloatArray
     duplicate: np.ndarray
     noise: Noise
@@ -131,6 +133,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         projectile_level=projectile_level,
         trusted=trusted,
         swept=swept,
+        corridor=_find_corridor(swept),
         brightness=brightness_array,
         duplicate=np.array(duplicate),
         noise=noise,
@@ -139,6 +142,13 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         surface_sigma=surface_sigma,
         ceiling=ceiling,
     )
+
+
+def _find_corridor(swept: np.ndarray) -> tuple[int, int]:
+    """Columns over which the projectile passes: those swept over a great height, unlike those with spray."""
+    tall = swept.sum(axis=0)
+    columns = np.flatnonzero(tall > 0.7 * tall.max())
+    return int(columns[0]), int(columns[-1])
 
 
 def _otsu(values: FloatArray) -> float:
@@ -208,11 +218,10 @@ def _find_surface(
     background: FloatArray, lit: np.ndarray, swept: np.ndarray, noise: Noise, count: int
 ) -> tuple[tuple[float, float] | None, float]:
     """Line through the half-way crossings from lit picture to dust beside the path; None where there is no dust."""
-    _rows, columns = np.nonzero(swept)
     bottom = lit[-3:].mean()
     if bottom > 0.3:
         return None, 0.0
-    left, right = columns.min(), columns.max()
+    left, right = _find_corridor(swept)
     radius = max(5, (right - left) // 4)
     xs, ys = [], []
     height = background.shape[0]
@@ -258,9 +267,9 @@ def _fill_holes(
     h, w = background.shape
     y, x = np.mgrid[0:h, 0:w]
     above = np.ones((h, w), bool) if surface is None else y < surface[0] + surface[1] * x - 4.0
-    columns = np.flatnonzero(swept.any(axis=0))
+    first, last = _find_corridor(swept)
     corridor = np.zeros((h, w), bool)
-    corridor[:, columns.min() : columns.max() + 1] = True
+    corridor[:, max(0, first - 4) : last + 5] = True
     good = lit & above
     holes = above & corridor & ~cv2.erode(good.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
     if not holes.any() or (good & ~holes).sum() < 50:

@@ -82,11 +82,16 @@ def follow_projectile(
     """
     scene = survey_scene(frames, progress)
     count = len(scene.brightness)
-    surface = scene.surface_row(float(np.mean(np.flatnonzero(scene.swept.any(axis=0)))))
+    surface = scene.surface_row(0.5 * sum(scene.corridor))
     outlines = _outline_all(frames, scene, progress)
     _check_direction(frames, outlines)
     usable = _usable_pixels(scene)
     warnings = list(frames.warnings)
+    full = scene.background >= 0.99 * scene.ceiling
+    if np.mean(full[usable]) > 0.02:
+        warnings.append(
+            "the background is saturated: edges look shifted and error bars are too small; use less light"
+        )
 
     top = _follow_end(frames, scene, usable, outlines, "top", progress)
     tip = _follow_end(frames, scene, usable, outlines, "tip", progress)
@@ -139,7 +144,11 @@ def follow_projectile(
             tip_x = np.where(np.isfinite(entering.y), entering.x, tip_x)
             ratio = float(np.nanmedian(tip.sigma / first_sigma))
             tip_sigma = np.where(np.isfinite(entering.y), entering.sigma * ratio, tip_sigma)
-            row, sigma, x, reason = _join(top, tip_y, tip_x, tip_sigma, tip.reason, reach, side, doubt)
+            lowest = top.template.top + top.template.opacity.shape[0] - MARGIN
+            shared = reach - tip_offset + tip.template.top + MARGIN < lowest
+            row, sigma, x, reason = _join(
+                top, tip_y, tip_x, tip_sigma, tip.reason, reach, side, doubt, shared
+            )
         else:
             warnings.append(
                 "tip and top end are never seen together: frames with a buried tip have no position"
@@ -164,9 +173,9 @@ def follow_projectile(
         raise MeasurementError(
             frames.path, "video", f"only {int(valid.sum())} frames can be tracked ({common})"
         )
-    row, rotation = _straighten(
-        row, x, valid, surface_row if surface_row is not None else surface, frames, warnings
-    )
+    where = surface_row if surface_row is not None else surface.value if surface is not None else None
+    level = None if scene.surface is None else float(np.arctan(-scene.surface[1]))
+    row, rotation = _straighten(row, x, valid, tip_radius or 0.0, where, level, warnings)
     rejected = int(np.sum(~valid))
     if rejected:
         kinds = {r: reason.count(r) for r in reason if r}
@@ -417,12 +426,15 @@ def _join(
     reach: float,
     side: float,
     doubt: float,
+    shared: bool,
 ) -> tuple[FloatArray, FloatArray, FloatArray, list[str]]:
     """One track from both ends: weighted mean where both are seen, the one that is seen elsewhere."""
     from_top = top.y + reach
     top_sigma = np.hypot(top.sigma, doubt)
     w_tip = np.where(np.isfinite(tip_y), 1 / tip_sigma**2, 0.0)
     w_top = np.where(np.isfinite(from_top), 1 / top_sigma**2, 0.0)
+    if shared:  # both see the same pixels: the better one alone, a mean would count their noise twice
+        w_tip, w_top = np.where(w_tip >= w_top, w_tip, 0.0), np.where(w_top > w_tip, w_top, 0.0)
     total = w_tip + w_top
     with np.errstate(invalid="ignore", divide="ignore"):
         row = (np.where(w_tip > 0, tip_y, 0.0) * w_tip + np.where(w_top > 0, from_top, 0.0) * w_top) / total
@@ -491,21 +503,15 @@ def _straighten(
     row: FloatArray,
     x: FloatArray,
     valid: np.ndarray,
-    surface: Measured | float | None,
-    frames: Frames,
+    radius: float,
+    surface: float | None,
     warnings: list[str],
 ) -> tuple[FloatArray, Measured | None]:
     """Rows along the line of the fall: a camera that is rotated by θ shortens rows by cos θ."""
     good = valid & np.isfinite(x)
     if good.sum() < 8 or np.ptp(row[good]) < 10:
         return row, None
-    y0 = (
-        surface.value
-        if isinstance(surface, Measured)
-        else surface
-        if surface is not None
-        else float(np.mean(row[good]))
-    )
+    y0 = surface if surface is not None else float(np.mean(row[good]))
     keep = good.copy()
     for _ in range(3):
         slope, offset = np.polyfit(row[keep], x[keep], 1)
@@ -513,9 +519,14 @@ def _straighten(
         keep = good & (np.abs(misfit) < 4 * max(1.4826 * float(np.median(np.abs(misfit[keep]))), 0.02))
     spread = float(np.std(misfit[keep])) / (np.std(row[keep]) * np.sqrt(max(keep.sum() - 2, 1)))
     angle = float(np.arctan(slope))
+    if level is not None and abs(angle) > np.radians(0.3) and abs(level - angle) > abs(angle) / 2:
+        if abs(slope) > 5 * spread:
+            warnings.append(f"the projectile falls {np.degrees(angle):+.2f}° aslant of the surface's normal")
+        return row, Measured(level, spread)
     if abs(angle) > np.radians(0.5) and abs(slope) > 5 * spread:
         warnings.append(f"the fall is {np.degrees(angle):+.2f}° off the columns: rows are measured along it")
-    return y0 + (row - y0) * np.hypot(1.0, slope), Measured(angle, spread)
+    # the tip's circle moves along the fall; its lowest point lies one radius below its centre in either direction
+    return y0 + (row - radius - y0) * np.hypot(1.0, slope) + radius, Measured(angle, spread)
 
 
 def _raise_to_scatter(row: FloatArray, sigma: FloatArray, what: str, warnings: list[str]) -> FloatArray:
@@ -523,18 +534,16 @@ def _raise_to_scatter(row: FloatArray, sigma: FloatArray, what: str, warnings: l
     index = np.flatnonzero(np.isfinite(row))
     if len(index) < 20:
         return sigma
-    ratios = []
-    for i in range(3, len(index) - 3):
-        near = index[i - 3 : i + 4]
-        if near[-1] - near[0] != 6:
-            continue
-        # third-degree difference of seven neighbours: blind to position, speed, acceleration and jerk
-        weights = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0])
-        ratios.append((weights @ row[near]) / np.sqrt(np.sum((weights * sigma[near]) ** 2)))
-    if len(ratios) < 12:
+    near = np.stack([index[k : len(index) - 3 + k] for k in range(4)])
+    near = near[:, near[3] - near[0] == 3]
+    # third difference of four neighbours: blind to position, speed and acceleration
+    weights = np.array([1.0, -3.0, 3.0, -1.0])
+    ratios = (weights @ row[near]) / np.sqrt(weights**2 @ sigma[near] ** 2)
+    if ratios.size < 12:
         return sigma
-    factor = 1.4826 * float(np.median(np.abs(ratios)))
-    if factor > 1.15:
+    inside = np.abs(ratios) < 4 * 1.4826 * np.median(np.abs(ratios))
+    factor = float(np.sqrt(np.mean(ratios[inside] ** 2)))
+    if factor > 1.0 + 2.5 / np.sqrt(ratios.size):  # beyond what chance does with so few
         if factor > 1.6:
             warnings.append(
                 f"{what} scatters {factor:.1f} times more than the noise explains: its error bars were raised"
