@@ -111,12 +111,13 @@ def advance(
                 mirror_axis(n, images, source, s[k], -1.0)
             if axisymmetric:
                 for k in range(images):
-                    ratio = abs(x[n + k]) / x[source[k]]  # of ring radii; 1 on the axis
-                    s[WEIGHT, n + k] *= ratio
+                    ratio = x[n + k] / x[source[k]]  # of ring radii: minus one across the axis
+                    s[WEIGHT, n + k] *= abs(ratio)
+                    # odd for the radial force, so that uniform stress leaves none; even for the axial one: momentum
                     s[MXX, n + k] *= ratio
                     s[MXZ, n + k] *= ratio
-                    s[MZX, n + k] *= ratio
-                    s[MZZ, n + k] *= ratio
+                    s[MZX, n + k] *= abs(ratio)
+                    s[MZZ, n + k] *= abs(ratio)
         sum_forces(
             n, x, z, u, w, area, s[WEIGHT], s[SOUND], s[LXX], s[LXZ], s[LZX], s[LZZ], s[MXX], s[MXZ], s[MZX], s[MZZ],
             start, neighbour, h, alpha, beta, affine, s[FX], s[FZ], s[HEAT],
