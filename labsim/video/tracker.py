@@ -505,6 +505,7 @@ def _straighten(
     valid: np.ndarray,
     radius: float,
     surface: float | None,
+    level: float | None,
     warnings: list[str],
 ) -> tuple[FloatArray, Measured | None]:
     """Rows along the line of the fall: a camera that is rotated by θ shortens rows by cos θ."""
