@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,12 @@ from . import options
 
 # factor to a unit that people see, by the unit in files
 SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm")}
+
+WIDE = 130  # columns that the table needs; a list below that, and into files
+KEY = (
+    "Priors: a ± b normal, |0 ± b| its upper half, a ×/÷ b log-normal, a to b uniform; each with its reason in --json. "
+    "Add your own as CAMPAIGN/effects/NAME.py (docs/effects.md)."
+)
 
 
 def effects(
@@ -41,7 +48,10 @@ def effects(
     from rich.table import Table
     from rich.text import Text
 
-    console = Console(soft_wrap=False)
+    console = Console()
+    if console.width < WIDE:
+        typer.echo(_list_narrow(known, reasons))
+        return
     table = Table(show_lines=True, title=f"{len(known)} effects", title_justify="left")
     table.add_column("name", no_wrap=True)
     table.add_column("what is wrong", ratio=3)
@@ -56,12 +66,23 @@ def effects(
                 columns = ("\n".join(lines) for lines in zip(*shown, strict=True))
                 table.add_row(*(Text(cell) for cell in (name, f"{kind}: {effect.title}", *columns, leaves)))
     console.print(table)
-    console.print(
-        "Priors: a ± b normal, |0 ± b| its upper half, a ×/÷ b log-normal, a to b uniform; each with its reason in --json. "
-        "Add your own as CAMPAIGN/effects/NAME.py (docs/effects.md).",
-        highlight=False,
-        markup=False,
-    )
+    console.print(Text(KEY))
+
+
+def _list_narrow(known: dict[str, Effect], reasons: dict[str, str]) -> str:
+    lines = []
+    for kind in KINDS:
+        for name, effect in known.items():
+            if effect.kind == kind:
+                lines.append(f"{name} ({kind}): {effect.title}")
+                for shown, unit, prior in map(_show, effect.parameters):
+                    lines.append(f"    {shown}, prior {prior}" + (f" {unit}" if unit != "1" else ""))
+                if reasons[name]:
+                    lines.append(f"    not here: {reasons[name]}")
+                lines += textwrap.wrap(
+                    effect.leaves, 96, initial_indent="    leaves: ", subsequent_indent="    "
+                )
+    return "\n".join([*lines, "", *textwrap.wrap(KEY, 100)])
 
 
 def _show(parameter: Parameter) -> tuple[str, str, str]:

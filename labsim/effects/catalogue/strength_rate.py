@@ -43,4 +43,6 @@ expect = {"penetration_depth": -1, "stopping_time": -1}
 
 
 def change_setting(setting, values, place):
+    if values["eta"] == 0.0:
+        return setting
     return setting.replace(strength_rate=values["eta"], strength_rate_exponent=values["n"])

@@ -47,4 +47,6 @@ expect = {"penetration_depth": -1, "stopping_time": -1}
 
 
 def change_setting(setting, values, place):
+    if values["excess"] == 0.0:
+        return setting
     return setting.replace(crust_excess=values["excess"], crust_length=values["length"])

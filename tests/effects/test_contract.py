@@ -1,0 +1,231 @@
+"""Files that break the contract are named; a user's own file joins the catalogue."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labsim.campaign import read_campaign
+from labsim.effects import (
+    CATALOGUE,
+    HalfNormal,
+    Instrument,
+    LogNormal,
+    Normal,
+    Uniform,
+    list_effects,
+    list_places,
+    load_effect,
+    load_file,
+    reference_campaign,
+)
+from labsim.errors import EffectError
+from labsim.sph import DropSetting
+
+DATA = Path(__file__).parents[2] / "data" / "guettler2009"
+
+GOOD = '''"""Dust is carried along with the tip."""
+
+from dataclasses import replace
+
+from labsim.effects import HalfNormal, Parameter
+
+title = "Dust moves along with the tip"
+kind = "projectile"
+parameters = (
+    Parameter("mass", "kg", null=0.0, limits=(0.0, 1e-5), prior=HalfNormal(5e-7), step=2e-7,
+              text="About the dust in front of a tip of 1 mm, half its volume at the density of the sample."),
+)
+leaves = "Fast drops go deeper than slow ones say."
+references = ("Added mass of a sphere in a fluid",)
+expect = {"penetration_depth": 1}
+
+
+def change_setting(setting, values, place):
+    return setting.replace(projectile=replace(setting.projectile, mass=setting.projectile.mass + values["mass"]))
+'''
+
+# what is replaced in GOOD by what, and what the error must name besides the file
+BROKEN = {
+    "not python": ("def change", "dfe change", ["line 18", "not Python"]),
+    "raises": ('kind = "projectile"', "kind = 1 / 0", ["ZeroDivisionError", "correct the file"]),
+    "missing import": ("import HalfNormal, Parameter", "import Nonsense", ["Nonsense"]),
+    "no title": ('title = "Dust moves along with the tip"', "", ["title", "is missing"]),
+    "empty title": ("Dust moves along with the tip", "", ["title"]),
+    "unknown kind": ('kind = "projectile"', 'kind = "magic"', ["kind", "magic", "material, sample"]),
+    "no parameters": ("parameters = (", "forgotten = (", ["parameters", "is missing"]),
+    "not a tuple": ("parameters = (\n", "parameters = 3\nrest = (\n", ["parameters", "tuple of Parameter"]),
+    "null outside": ("null=0.0", "null=-1.0", ["parameters.mass", "null -1", "0 to 1e-05"]),
+    "limits turned": ("limits=(0.0, 1e-5)", "limits=(1e-5, 0.0)", ["parameters.mass", "limits", "grow"]),
+    "limits infinite": ("limits=(0.0, 1e-5)", 'limits=(0.0, float("inf"))', ["parameters.mass", "finite"]),
+    "no step": ("step=2e-7", "step=0.0", ["parameters.mass", "step"]),
+    "step too long": ("step=2e-7", "step=-2e-7", ["parameters.mass", "null + step", "turn the step"]),
+    "no prior": ("prior=HalfNormal(5e-7)", "prior=0.3", ["parameters.mass", "HalfNormal"]),
+    "no width": ("HalfNormal(5e-7)", "HalfNormal(0.0)", ["parameters.mass", "positive width"]),
+    "prior elsewhere": ("HalfNormal(5e-7)", "HalfNormal(5e-7, 1.0)", ["parameters.mass", "leaves nothing"]),
+    "no unit": ('"kg"', '""', ["parameters.mass", "unit"]),
+    "no reason": ("About the dust in front of a tip of 1 mm, half its volume at the density of the sample.", "",
+                  ["parameters.mass", "text is empty"]),
+    "bad name": ('"mass", "kg"', '"the mass", "kg"', ["the mass", "name"]),
+    "only shape": ("step=2e-7,", "step=2e-7, shape=True,", ["parameters", "all shape"]),
+    "text null": ("null=0.0", 'null="zero"', ["parameters.mass", "numbers"]),
+    "failing function": ("parameters = (\n", "def parameters(campaign): return campaign.nonsense\nrest = (\n",
+                         ["parameters", "AttributeError"]),
+    "no leaves": ('leaves = "', 'left = "', ["leaves", "is missing"]),
+    "no references": ("references = (", "sources = (", ["references", "tuple of texts"]),
+    "unknown observable": ('"penetration_depth": 1', '"depth": 1', ["expect", "penetration_depth"]),
+    "sign not a sign": ('"penetration_depth": 1', '"penetration_depth": 2', ["expect", "-1, 0 or 1"]),
+    "changes nothing": ("def change_setting", "def change_nothing", ["change_setting", "at least one"]),
+    "two arguments": ("(setting, values, place)", "(setting, values)", ["change_setting", "3 arguments"]),
+    "not a function": ("def change_setting", "change_setting = 1\ndef other", ["change_setting", "not a function"]),
+    "applies is text": ('title = "', 'applies = "yes"\ntitle = "', ["applies", "not a function"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_contract_names_the_file(name: str, tmp_path: Path) -> None:
+    old, new, words = BROKEN[name]
+    assert old in GOOD
+    file = tmp_path / "added_mass.py"
+    file.write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(EffectError) as caught:
+        load_file(file)
+    text = str(caught.value)
+    assert text.startswith(f"{file}: ") and "\n" not in text
+    for word in words:
+        assert word in text, text
+
+
+def test_applies_must_give_a_text(tmp_path: Path) -> None:
+    file = tmp_path / "added_mass.py"
+    file.write_text(GOOD + "\n\ndef applies(campaign):\n    return True\n")
+    with pytest.raises(EffectError, match=r"added_mass\.py: applies: returned True"):
+        load_file(file).applies(reference_campaign())
+
+
+def copy_campaign(folder: Path) -> Path:
+    return Path(shutil.copytree(DATA, folder / "mine"))
+
+
+def test_a_users_own_file_joins_the_catalogue(tmp_path: Path) -> None:
+    folder = copy_campaign(tmp_path)
+    (folder / "effects").mkdir()
+    (folder / "effects" / "added_mass.py").write_text(GOOD)
+    (folder / "effects" / "_notes.py").write_text("this is not Python")
+    campaign = read_campaign(folder)
+    effects = list_effects(campaign)
+    assert set(effects) - set(list_effects()) == {"added_mass"}
+    assert "added_mass" in list_effects(folder)
+    mine = effects["added_mass"]
+    assert mine.applies(campaign) == "" and mine.costs_runs and mine.description.startswith("Dust is carried")
+    place = list_places(campaign)["S01"]
+    drop = campaign.drops[0]
+    setting = DropSetting(projectile=drop.projectile, impact_speed=0.65, material=campaign.material)
+    assert mine.apply(setting, {"mass": 1e-7}, place).projectile.mass == drop.projectile.mass + 1e-7
+    assert mine.apply(setting, {}, place) == setting
+    assert mine.apply_to_instrument(Instrument(), {"mass": 1e-7}, place) == Instrument()
+    assert sorted(path.name for path in (folder / "effects").iterdir()) == ["_notes.py", "added_mass.py"]
+
+
+def test_an_edited_file_is_loaded_anew(tmp_path: Path) -> None:
+    file = tmp_path / "added_mass.py"
+    file.write_text(GOOD)
+    assert load_file(file).parameters[0].step == 2e-7
+    file.write_text(GOOD.replace("step=2e-7", "step=3e-7"))
+    assert load_file(file).parameters[0].step == 3e-7
+
+
+def test_names_that_are_taken_or_cannot_be_names(tmp_path: Path) -> None:
+    folder = copy_campaign(tmp_path)
+    (folder / "effects").mkdir()
+    file = folder / "effects" / "gravity.py"
+    file.write_text(GOOD)
+    with pytest.raises(EffectError, match=r"gravity\.py: gravity is the name of an effect of the catalogue"):
+        list_effects(folder)
+    file.rename(file.with_name("Added-Mass.py"))
+    with pytest.raises(EffectError, match=r"Added-Mass\.py: 'Added-Mass' cannot be an effect's name"):
+        list_effects(folder)
+
+
+def test_an_unknown_name_lists_the_known_ones() -> None:
+    with pytest.raises(EffectError, match=r"frition.*contact_friction, ct_blur"):
+        load_effect("frition")
+    assert load_effect("gravity").name == "gravity"
+
+
+def test_nothing_but_effects_lies_in_the_catalogue() -> None:
+    assert {file.stem for file in CATALOGUE.glob("*.py")} - {"__init__"} == set(list_effects())
+
+
+def test_nulls_are_the_campaigns_own() -> None:
+    usual = reference_campaign()
+    material = usual.material.replace(
+        delta=0.33, phi_2=0.33, bulk_modulus=3e5, shear_factor=0.8, contact_friction=0.2
+    )
+    sample = dataclasses.replace(usual.sample, filling_factor=0.2, depth=0.012)
+    campaign = dataclasses.replace(usual, material=material, sample=sample)
+    nulls = {
+        f"{name}.{parameter.name}": parameter.null
+        for name, effect in list_effects(campaign).items()
+        for parameter in effect.parameters
+    }
+    assert nulls["strength_slope.delta"] == 0.33 and nulls["strength_ceiling.phi_2"] == 0.33
+    assert nulls["bulk_modulus.K0"] == 3e5 and nulls["shear_strength.factor"] == 0.8
+    assert nulls["contact_friction.mu"] == 0.2 and nulls["filling_factor.phi_0"] == 0.2
+    assert nulls["hard_floor.depth"] == 0.012
+
+
+@pytest.mark.parametrize("phi", [0.13, 0.15, 0.25, 0.4])
+@pytest.mark.parametrize("phi_2", [0.33, 0.58, 0.70])
+def test_the_catalogue_fits_other_laboratories(phi: float, phi_2: float) -> None:
+    """Limits, steps and priors hold for dust near either end of its law, for small and for large tips."""
+    if phi >= phi_2:
+        pytest.skip("no such dust")
+    usual = reference_campaign()
+    for scale in (0.2, 1.0, 5.0):
+        drops = tuple(
+            dataclasses.replace(
+                drop,
+                projectile=dataclasses.replace(
+                    drop.projectile,
+                    tip_radius=scale * drop.projectile.tip_radius,
+                    mass=scale**3 * drop.projectile.mass,
+                ),
+            )
+            for drop in usual.drops
+        )
+        campaign = dataclasses.replace(
+            usual,
+            drops=drops,
+            sample=dataclasses.replace(usual.sample, filling_factor=phi),
+            material=usual.material.replace(phi_2=phi_2),
+        )
+        for effect in list_effects(campaign).values():
+            assert effect.at() == {parameter.name: parameter.null for parameter in effect.parameters}
+
+
+@pytest.mark.parametrize(
+    "prior", [Normal(1.0, 0.3), HalfNormal(2.0, 0.5), LogNormal(3.0, 0.6), Uniform(-1.0, 4.0)]
+)
+def test_priors_agree_with_themselves(prior: Normal | HalfNormal | LogNormal | Uniform) -> None:
+    from scipy import stats
+
+    twin = {
+        Normal: lambda: stats.norm(1.0, 0.3),
+        HalfNormal: lambda: stats.halfnorm(0.5, 2.0),
+        LogNormal: lambda: stats.lognorm(0.6, scale=3.0),
+        Uniform: lambda: stats.uniform(-1.0, 5.0),
+    }[type(prior)]()
+    x = np.linspace(-2.0, 8.0, 41)
+    assert np.allclose(prior.logpdf(x), twin.logpdf(x), rtol=1e-12)
+    assert np.allclose(prior.cdf(x), twin.cdf(x), rtol=1e-12, atol=1e-14)
+    q = np.linspace(0.01, 0.99, 21)
+    assert np.allclose(prior.ppf(q), twin.ppf(q), rtol=1e-9)
+    rng = np.random.default_rng(4)
+    draws = [prior.sample(rng) for _ in range(4000)]
+    assert stats.kstest(draws, twin.cdf).pvalue > 1e-3
+    assert prior.describe()

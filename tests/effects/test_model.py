@@ -1,0 +1,169 @@
+"""model.toml there and back, what it does to a drop, and its mistakes by file, key, value and remedy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from labsim.cli import main
+from labsim.effects import (
+    Instrument,
+    Model,
+    apply_model,
+    check_model,
+    list_effects,
+    list_places,
+    make_instrument,
+    read_model,
+    reference_campaign,
+    write_model,
+)
+from labsim.errors import EffectError
+from labsim.records import Projectile
+from labsim.sph import DropSetting
+
+FULL = Model(
+    1012.3456789012345,
+    (
+        ("strength_rate", {"eta": 0.1 + 0.2, "n": 0.45}),
+        ("pixel_scale", {"factor": 1.03}),
+        ("planar_geometry", {}),
+    ),
+    (("delta", 0.6), ("bulk_modulus", 4500.0)),
+)
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    return int(left.value.code or 0)
+
+
+def test_there_and_back(tmp_path: Path) -> None:
+    path = write_model(tmp_path / "model.toml", FULL, comments=["made by a test\nof two lines"])
+    assert read_model(path) == FULL
+    text = path.read_text()
+    assert text.startswith("# made by a test\n# of two lines\nformat = 1\n")
+    assert (
+        "[effects.strength_rate]  # The strength grows" in text and "eta = 0.30000000000000004  # s^n" in text
+    )
+    assert [file.name for file in tmp_path.iterdir()] == ["model.toml"]
+
+
+def test_shape_may_be_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text("[material]\np_m_Pa = 900\n[effects.strength_rate]\neta = 0.05\n")
+    model = read_model(path)
+    assert model == Model(900.0, (("strength_rate", {"eta": 0.05}),))
+    place = next(iter(list_places(reference_campaign()).values()))
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.3e-6), 0.5, reference_campaign().material)
+    changed = apply_model(setting, model, place)
+    assert (changed.strength_rate, changed.strength_rate_exponent) == (0.05, 0.5)
+    assert changed.material == setting.material.replace(p_m=900.0)
+    assert make_instrument(model, place) == Instrument()
+
+
+def test_what_a_model_says_of_drop_and_instrument() -> None:
+    place = next(iter(list_places(reference_campaign()).values()))
+    setting = DropSetting(
+        Projectile("cylinder", 5e-4, 2e-3), 0.5, reference_campaign().material, geometry="planar"
+    )
+    changed = apply_model(setting, FULL, place)
+    assert changed.geometry == "axisymmetric" and changed.projectile.tip == "hemisphere"
+    assert changed.strength_rate == 0.1 + 0.2
+    assert changed.material == setting.material.replace(p_m=FULL.p_m, delta=0.6, bulk_modulus=4500.0)
+    assert make_instrument(FULL, place) == Instrument(pixel_factor=1.03)
+    with pytest.raises(
+        EffectError, match=r"planar_geometry: does not apply here: the nominal model is round"
+    ):
+        check_model(FULL, reference_campaign(), list_effects())
+
+
+MISTAKES = {
+    "": ["material.p_m_Pa", "is missing"],
+    "format = 2\n[material]\np_m_Pa = 1e3\n": ["format", "2", "write 1"],
+    "[material\n": ["not TOML", "line 1"],
+    "p_m_Pa = 1e3\n": ["p_m_Pa", "not a key", "material"],
+    "material = 3\n": ["material", "3", "[material]"],
+    "[material]\np_m_Pa = -3\n": ["material.p_m_Pa", "-3", "1 to 1e+08"],
+    '[material]\np_m_Pa = "1 kPa"\n': ["material.p_m_Pa", "1 kPa", "number"],
+    "[material]\np_m_Pa = nan\n": ["material.p_m_Pa", "nan", "finite"],
+    "[material]\np_m_Pa = 1e3\nphi_3 = 1\n": ["material.phi_3", "did you mean phi_"],
+    "[material]\np_m_Pa = 1e3\nphi_2 = 7\n": ["material.phi_2", "7", "0.01 to 1"],
+    "[material]\np_m_Pa = 1e3\n[effects.strenght_rate]\n": [
+        "effects.strenght_rate",
+        "did you mean strength_rate",
+    ],
+    "[material]\np_m_Pa = 1e3\n[effects.strength_rate]\n": ["effects.strength_rate.eta", "is missing", "s^n"],
+    "[material]\np_m_Pa = 1e3\n[effects]\ngravity = 9.81\n": ["effects.gravity", "9.81", "[effects.gravity]"],
+    "[material]\np_m_Pa = 1e3\n[effects.gravity]\ng = 99\n": ["effects.gravity.g", "99", "0 to 20"],
+    "[material]\np_m_Pa = 1e3\n[effects.gravity]\nG = 9\n": ["effects.gravity.G", "not a key", "use g"],
+    "[material]\np_m_Pa = 1e3\n[effects.planar_geometry]\nx = 9\n": [
+        "effects.planar_geometry.x",
+        "no parameter",
+    ],
+    "[material]\np_m_Pa = 1e3\n[gravity]\n": ["gravity", "not a key", "effects"],
+}
+
+
+@pytest.mark.parametrize("text", MISTAKES)
+def test_mistakes_are_named(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    with pytest.raises(EffectError) as caught:
+        read_model(path)
+    for word in (str(path), *MISTAKES[text]):
+        assert word in str(caught.value), str(caught.value)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    missing = tmp_path / "nothing.toml"
+    assert call("simulate", "-o", str(tmp_path / "out"), "--model", str(missing)) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {missing}: ") and error.count("\n") == 1
+
+
+def simulate(tmp_path: Path, model: str, *arguments: str) -> dict:
+    path = tmp_path / "model.toml"
+    path.write_text(model)
+    options = ["-o", str(tmp_path / "out"), "--store", str(tmp_path / "store"), "--workers", "1", "--json"]
+    assert call("simulate", *options, "--model", str(path), "--spacing-um", "125", *arguments) == 0
+    return json.loads((tmp_path / "out" / "run.json").read_text())
+
+
+def test_simulate_with_a_model(tmp_path: Path) -> None:
+    """The gain is there when the user applies it: the run is that of the setting with the effect."""
+    plain = simulate(tmp_path, "[material]\np_m_Pa = 900\n")
+    rate = simulate(tmp_path, "[material]\np_m_Pa = 900\n[effects.strength_rate]\neta = 0.05\n")
+    assert rate["setting"]["strength_rate"] == 0.05 and rate["setting"]["material"]["p_m"] == 900.0
+    assert plain["setting"]["strength_rate"] == 0.0
+    assert rate["penetration_depth_m"] < 0.95 * plain["penetration_depth_m"]
+
+
+def test_simulate_says_what_is_not_of_the_drop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text("[material]\np_m_Pa = 900\n[effects.pixel_scale]\nfactor = 1.05\n")
+    options = ["-o", str(tmp_path / "out"), "--store", str(tmp_path / "store"), "--workers", "1"]
+    assert call("simulate", *options, "--model", str(path), "--spacing-um", "125") == 0
+    assert "pixel_scale acts on what is measured, not on the drop" in capsys.readouterr().out
+    path.write_text("[material]\np_m_Pa = 900\n[effects.gravity]\ng = 9.81\n")
+    assert call("simulate", *options, "--model", str(path), "--spacing-um", "125") == 2
+    assert "effects.gravity: does not apply here: the nominal model has gravity" in capsys.readouterr().err
+
+
+def test_the_catalogue_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    data = Path(__file__).parents[2] / "data" / "guettler2009"
+    assert call("effects") == 0
+    printed = capsys.readouterr().out
+    assert call("effects", "--json", str(data)) == 0
+    listed = json.loads(capsys.readouterr().out)["effects"]
+    assert [each["name"] for each in listed] == list(list_effects()) and len(listed) == 24
+    for each in listed:
+        assert each["name"] in printed and each["title"] in printed
+        assert each["leaves"] and each["references"]
+    applies = {each["name"]: each["applies"] for each in listed}
+    assert applies["planar_geometry"] and applies["gravity"] and not applies["ct_scale"]
+    k0 = next(each for each in listed if each["name"] == "bulk_modulus")["parameters"][0]
+    assert k0["name"] == "bulk_modulus.K0" and k0["unit"] == "Pa" and k0["null"] == 300e3
