@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..campaign import read_campaign
+from ..campaign import MATERIAL_KEYS, read_campaign
 from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
+from ..effects import Model, write_model
 from ..inference.runs import RunStore
 from ..inference.summary import calibrate_summary
 from . import options
@@ -62,13 +63,23 @@ def diagnose(
 def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:
     """Files of a calibration and its diagnosis; the summary and the lines for people."""
     from ..report.figures import draw_compacted_volume, draw_density_field, draw_depth_law, draw_penetration
-    from ..report.tables import diagnosis_lines, diagnosis_summary, model_text
+    from ..report.tables import diagnosis_lines, diagnosis_summary
 
     calibration = found.calibration
     write_calibration(calibration, folder)
     summary = diagnosis_summary(found)
     options.write_json(folder / "diagnosis.json", summary)
-    (folder / "model.toml").write_text(model_text(calibration))
+    q = calibration.quantiles
+    material = calibration.campaign.material.replace(bulk_modulus=calibration.bulk_modulus)
+    fields = [field for field, _low, _high in MATERIAL_KEYS.values()]
+    write_model(
+        folder / "model.toml",
+        Model(q["q50"], material=tuple((field, getattr(material, field)) for field in fields)),
+        comments=[
+            f"{calibration.campaign.name}: p_m calibrated on {' and '.join(calibration.use)}, planar, "
+            f"90 % between {q['q05']:.0f} and {q['q95']:.0f} Pa"
+        ],
+    )
     draw_penetration(calibration, folder / "penetration.png")
     draw_depth_law(found, folder / "depth_law.png")
     draw_compacted_volume(found, folder / "compacted_volume.png")

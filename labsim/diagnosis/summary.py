@@ -497,7 +497,9 @@ def _say(
     else:
         begin += "misses none of the other figures"
     if kept:
-        begin += "; it keeps " + ", ".join(row.name for row in kept)
+        begin += "; it keeps " + " and ".join(
+            f"the {row.name}" if row.kind == "compacted_volume" else row.name for row in kept
+        )
     parts = [begin]
     if scaling is not None:
         away = (scaling.ratio_equal_speed - scaling.observed) / math.hypot(

@@ -201,14 +201,15 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
         across, z, phi = np.concatenate([-across, across]), np.tile(z, 2), np.tile(phi, 2)
     half = 4.5 * radius
     deep = run.penetration_depth + 3.0 * radius
-    # each point shows the nearest particle; beyond 0.8 spacings there is no dust
+    # each point shows the nearest particle; a spacing away, above the surface half of one, there is no dust
     step = setting.spacing / 3.0
     columns = np.arange(-half, half + step, step)
     rows = np.arange(-deep, 1.2 * radius, step)
     distance, nearest = KDTree(np.column_stack([across, z])).query(
-        np.stack(np.meshgrid(columns, rows), axis=-1), distance_upper_bound=0.8 * setting.spacing
+        np.stack(np.meshgrid(columns, rows), axis=-1)
     )
-    field = np.where(np.isfinite(distance), np.append(phi, np.nan)[nearest], np.nan)
+    reach = np.where(rows > 0.0, 0.5, 1.0)[:, None] * setting.spacing
+    field = np.where(distance < reach, phi[nearest], np.nan)
     with new_figure(path, 6.8, 4.4) as figure:
         axes = figure.add_subplot()
         drawn = axes.pcolormesh(

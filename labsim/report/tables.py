@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..campaign import MATERIAL_KEYS
 from ..diagnosis.summary import Prediction, SummaryDiagnosis, people
-from ..inference.planar import READINGS
+from ..inference.planar import ALPHA, READINGS
 from ..inference.summary import REFERENCE_P_M, SummaryCalibration
 
 VERDICTS = {
@@ -49,7 +48,7 @@ def calibration_lines(calibration: SummaryCalibration) -> str:
             lines.append(row)
     lines += [
         "",
-        f"Raw planar drop at p_m = {REFERENCE_P_M / 1e3:g} kPa and its change when the spacing is halved:",
+        f"Raw planar drop at p_m = {REFERENCE_P_M / 1e3:g} kPa, α = {ALPHA:g}, and its change when the spacing is halved:",
     ]
     for k0, error in sorted(calibration.numerical.items(), reverse=True):
         (d1, d2), (t1, t2) = error.depth, error.stopping_time
@@ -90,20 +89,6 @@ def diagnosis_lines(diagnosis: SummaryDiagnosis) -> str:
     return "\n".join(lines + warning_lines(diagnosis.warnings))
 
 
-def model_text(calibration: SummaryCalibration) -> str:
-    """model.toml: the calibrated model, as ``labsim simulate --model`` reads it."""
-    q = calibration.quantiles
-    material = calibration.campaign.material.replace(bulk_modulus=calibration.bulk_modulus)
-    lines = [
-        f"# {calibration.campaign.name}: p_m calibrated on {' and '.join(calibration.use)}; 90 % between",
-        f"# {q['q05']:.0f} and {q['q95']:.0f} Pa",
-        "[material]",
-        f"p_m_Pa = {q['q50']:.1f}",
-    ]
-    lines += [f"{key} = {getattr(material, field)!r}" for key, (field, _low, _high) in MATERIAL_KEYS.items()]
-    return "\n".join(lines) + "\n"
-
-
 def warning_lines(warnings: tuple[str, ...]) -> list[str]:
     return [f"warning: {warning}" for warning in warnings]
 
@@ -135,6 +120,7 @@ def calibration_summary(calibration: SummaryCalibration) -> dict[str, Any]:
                 "bulk_modulus_Pa": e.bulk_modulus,
                 "p_m_Pa": e.p_m,
                 "spacings_m": list(e.spacings),
+                "artificial_viscosity": ALPHA,
                 "penetration_depth_m": list(e.depth),
                 "stopping_time_s": list(e.stopping_time),
                 "dlnD_dlnp_m": calibration.slopes[k0],
