@@ -53,8 +53,13 @@ def new_figure(path: Path, width: float = 6.4, height: float = 4.4) -> Iterator[
 def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
     """Raw penetration against time for five p_m, with the published depth and stopping time as target lines."""
     drop = calibration.figures[0].drop
-    runs = list(calibration.runs[drop, calibration.bulk_modulus])
-    runs.append(calibration.runs["spacing", calibration.bulk_modulus][0])
+    reference = calibration.runs["spacing", calibration.bulk_modulus][0]
+    near = 0.1  # of ln p_m: two such curves would lie on each other
+    runs = [reference] + [
+        run
+        for run in calibration.runs[drop, calibration.bulk_modulus]
+        if abs(np.log(run.setting.material.p_m / reference.setting.material.p_m)) > near
+    ]
     runs.sort(key=lambda run: run.setting.material.p_m)
     middle = int(
         np.argmin([abs(np.log(run.setting.material.p_m / calibration.quantiles["q50"])) for run in runs])
@@ -87,6 +92,7 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
                 (at.value - at.sigma) * 1e3, (at.value + at.sigma) * 1e3, color=GREY, alpha=0.25, lw=0
             )
             axes.axvline(at.value * 1e3, color=INK, lw=1.0, ls="--")
+            axes.set_xlim(0.0, max(axes.get_xlim()[1], (at.value + 2.0 * at.sigma) * 1e3))
             axes.text((at.value - 1.3 * at.sigma) * 1e3, 0.01 * bottom, f"published stopping time, {at.value * 1e3:.1f} ms",
                       rotation=90, ha="right", va="top")  # fmt: skip
         setting = runs[middle].setting
