@@ -63,6 +63,9 @@ def track(
     rotate: Annotated[
         int, typer.Option("--rotate", help="Turn the picture anticlockwise: 90, 180, 270.")
     ] = 0,
+    part: Annotated[
+        str | None, typer.Option("--frames", help="FIRST-LAST: use only these pictures of the video.")
+    ] = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:
@@ -79,6 +82,8 @@ def track(
         found = video.read_track(request.source, Camera(rate, 1.0, row, 0.0), request.row_sigma)
     else:
         frames = video.open_frames(request.source).turned(rotate)
+        if part is not None:
+            frames = frames.section(*_read_range(part))
         with options.show_progress(quiet) as progress:
             seen = video.follow_projectile(
                 frames,
@@ -127,6 +132,13 @@ def _read_request(
             [],
         )
     return Request(path, None, fps, pixel, surface, row_sigma, [])
+
+
+def _read_range(text: str) -> tuple[int, int]:
+    first, dash, last = text.partition("-")
+    if not (dash and first.strip().isdigit() and last.strip().isdigit()):
+        raise LabsimError("command line", "--frames", f"{text!r} is no range; write FIRST-LAST, as 118-201")
+    return int(first), int(last)
 
 
 def _need(value: Any, where: Path, key: str, remedy: str) -> Any:

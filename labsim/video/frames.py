@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import pkgutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -68,6 +69,22 @@ class Frames:
             self.count, self.numbers = seen, self.numbers[:seen]
             self.stamps = None if self.stamps is None else self.stamps[:seen]
         self._kept = keep
+
+    def section(self, first: int, last: int) -> Frames:
+        """Only the pictures first to last (counted from 0, both included); their frame numbers stay."""
+        last = min(last, self.count - 1)
+        if not 0 <= first <= last:
+            raise MeasurementError(self.path, "--frames", f"{first}-{last} is not inside 0-{self.count - 1}")
+        start = self.start
+        return replace(
+            self,
+            start=lambda: itertools.islice(start(), first, last + 1),
+            count=last + 1 - first,
+            numbers=self.numbers[first : last + 1],
+            stamps=None if self.stamps is None else self.stamps[first : last + 1],
+            warnings=list(self.warnings),
+            _kept=None,
+        )
 
     def turned(self, degrees: int) -> Frames:
         """The same video turned anticlockwise by 90, 180 or 270 degrees."""

@@ -143,7 +143,8 @@ def follow_projectile(
             tip_y = np.where(np.isfinite(entering.y), entering.y + tip_offset, tip_y)
             tip_x = np.where(np.isfinite(entering.y), entering.x, tip_x)
             ratio = float(np.nanmedian(tip.sigma / first_sigma))
-            tip_sigma = np.where(np.isfinite(entering.y), entering.sigma * ratio, tip_sigma)
+            own = _raise_to_scatter(entering.y, entering.sigma * ratio, "the half-buried tip", warnings)
+            tip_sigma = np.where(np.isfinite(entering.y), own, tip_sigma)
             lowest = top.template.top + top.template.opacity.shape[0] - MARGIN
             shared = reach - tip_offset + tip.template.top + MARGIN < lowest
             row, sigma, x, reason = _join(
@@ -544,7 +545,7 @@ def _raise_to_scatter(row: FloatArray, sigma: FloatArray, what: str, warnings: l
         return sigma
     inside = np.abs(ratios) < 4 * 1.4826 * np.median(np.abs(ratios))
     factor = float(np.sqrt(np.mean(ratios[inside] ** 2)))
-    if factor > 1.0 + 2.5 / np.sqrt(ratios.size):  # beyond what chance does with so few
+    if factor > 1.0 + 1.5 / np.sqrt(ratios.size):  # beyond what chance does with so few
         if factor > 1.6:
             warnings.append(
                 f"{what} scatters {factor:.1f} times more than the noise explains: its error bars were raised"

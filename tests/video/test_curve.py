@@ -1,0 +1,156 @@
+"""From rows to contact, speed, depth and stop: synthetic motions with known figures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from labsim.errors import MeasurementError
+from labsim.records import Camera, Measured, Track
+from labsim.video import check_drop_height, fit_deceleration, fit_local_polynomial, read_track, write_track
+from labsim.video.synthetic import evaluate_motion
+
+RATE, PIXEL = 10_000.0, 20e-6
+CAMERA = Camera(RATE, PIXEL, 300.0, 0.0)
+
+
+def make_track(seed=0, sigma=0.02, *, speed=0.8, stop=3e-3, contact=6.0e-3, count=150, rebound=0.0, shape=0.4, drop=()):
+    rng = np.random.default_rng(seed)
+    t = np.arange(count) / RATE
+    z = evaluate_motion(t - contact, speed, stop, 9.81, shape)
+    if rebound:
+        after = np.clip(t - contact - stop, 0, None)
+        z = z - (rebound * after - 0.5 * 9.81 * after**2)
+    keep = np.setdiff1d(np.arange(count), drop)
+    row = 300 + z / PIXEL + rng.normal(0, sigma, count)
+    n = len(keep)
+    track = Track(keep, t[keep], row[keep], np.full(n, sigma), np.ones(n, bool), ("",) * n)
+    return track, float(evaluate_motion(np.array([stop]), speed, stop, 9.81, shape)[0])
+
+
+def test_figures_of_a_drop() -> None:
+    """T13: v0 0.3 %, t0 and T_s 0.02 ms, D 0.5 %, a(t) 2 % rms of the mean deceleration, at 0.03 px."""
+    for seed in range(10):
+        track, depth = make_track(seed, 0.03)
+        curve = fit_deceleration(track, CAMERA)
+        assert curve.impact_speed.value == pytest.approx(0.8, rel=0.003)
+        assert curve.contact_time.value == pytest.approx(6e-3, abs=2e-5)
+        assert curve.stopping_time.value == pytest.approx(3e-3, abs=2e-5)
+        assert curve.penetration_depth.value == pytest.approx(depth, rel=0.005)
+        inside = (curve.time > 1e-4) & (curve.time < 2.9e-3)
+        truth = -(0.8 / 3e-3) * (1 + 0.4 * (1 - 2 * curve.time[inside] / 3e-3))
+        assert np.sqrt(np.mean((curve.acceleration[inside] - truth) ** 2)) < 0.02 * 0.8 / 3e-3
+        assert curve.stopping_time_2_percent.value < curve.stopping_time.value
+        assert curve.apparent_gravity.value == pytest.approx(9.81, abs=4 * curve.apparent_gravity.sigma)
+
+
+def test_one_sigma_holds_about_two_thirds() -> None:
+    """T14: coverage of the stated 1 σ over 200 seeds is 60 to 76 % for all four figures."""
+    hits = {"contact_time": 0, "impact_speed": 0, "penetration_depth": 0, "stopping_time": 0}
+    for seed in range(200):
+        track, depth = make_track(1000 + seed, 0.05, count=110)
+        curve = fit_deceleration(track, CAMERA)
+        truth = {
+            "contact_time": 6e-3,
+            "impact_speed": 0.8,
+            "penetration_depth": depth,
+            "stopping_time": 3e-3,
+        }
+        for key, value in truth.items():
+            figure = getattr(curve, key)
+            hits[key] += abs(figure.value - value) < figure.sigma
+    shares = {key: count / 200 for key, count in hits.items()}
+    assert all(0.60 <= share <= 0.76 for share in shares.values()), shares
+
+
+def test_seed_law_from_fifteen_drops() -> None:
+    """T13: stopping time independent of speed and D ∝ v come back: slope of D against v within 1 %."""
+    speeds = np.linspace(0.15, 1.1, 15)
+    found = []
+    for seed, speed in enumerate(speeds):
+        track, _ = make_track(seed, 0.03, speed=speed, contact=8e-3, count=160)
+        found.append(fit_deceleration(track, CAMERA).penetration_depth.value)
+    truth = evaluate_motion(np.array([3e-3]), 1.0, 3e-3, 9.81, 0.4)[0]
+    assert np.sum(speeds * found) / np.sum(speeds**2) == pytest.approx(truth, rel=0.01)
+
+
+def test_rebound_is_found_and_does_not_spoil_the_depth() -> None:
+    track, depth = make_track(1, 0.03, rebound=0.05, count=130)
+    curve = fit_deceleration(track, CAMERA)
+    assert curve.rebound_speed is not None
+    assert curve.penetration_depth.value == pytest.approx(depth, rel=0.005)
+    assert curve.stopping_time.value == pytest.approx(3e-3, abs=6e-5)
+
+
+def test_outliers_and_gaps() -> None:
+    track, depth = make_track(2, 0.03, drop=(20, 21, 75, 76, 77))
+    row = track.tip_row.copy()
+    row[[10, 60, 90]] += [4.0, -7.0, 1.0]
+    curve = fit_deceleration(Track(track.frame, track.time, row, track.sigma, track.valid, track.reason), CAMERA)
+    assert any("outliers" in text for text in curve.warnings)
+    assert not curve.used[[10, 60]].any()
+    assert curve.penetration_depth.value == pytest.approx(depth, rel=0.005)
+    assert curve.stopping_time.value == pytest.approx(3e-3, abs=2e-5)
+
+
+def test_wrong_frame_rate_shows_in_free_fall_and_drop_height() -> None:
+    track, _ = make_track(3, 0.02)
+    fast = Track(track.frame, track.time / 1.06, track.tip_row, track.sigma, track.valid, track.reason)
+    curve = fit_deceleration(fast, CAMERA)
+    assert any("free flight falls with" in text for text in curve.warnings)
+    assert check_drop_height(curve, Measured(0.8**2 / 2 / 9.81, 1e-4)) is not None
+    assert check_drop_height(fit_deceleration(track, CAMERA), Measured(0.8**2 / 2 / 9.81, 1e-4)) is None
+
+
+def test_record_that_ends_too_early_gives_no_depth() -> None:
+    track, _ = make_track(4, 0.02, count=80)
+    curve = fit_deceleration(track, CAMERA)
+    assert np.isnan(curve.penetration_depth.value) and np.isnan(curve.stopping_time.value)
+    assert any("ends before the projectile stops" in text for text in curve.warnings)
+
+
+def test_surface_uncertainty_goes_into_the_depth() -> None:
+    track, _ = make_track(5, 0.02)
+    loose = fit_deceleration(track, Camera(RATE, PIXEL, 300.0, 0.3))
+    assert loose.penetration_depth.sigma == pytest.approx(0.3 * PIXEL, rel=0.2)
+
+
+def test_local_polynomial_agrees_inside() -> None:
+    track, _ = make_track(6, 0.02)
+    curve = fit_deceleration(track, CAMERA)
+    local = fit_local_polynomial(track, CAMERA, curve)
+    inside = (local["time_s"] > 3e-4) & (local["time_s"] < 2.5e-3)
+    fit = np.interp(local["time_s"][inside], curve.time, curve.velocity)
+    score = (local["velocity_m_s"][inside] - fit) / local["velocity_sigma_m_s"][inside]
+    assert np.sqrt(np.mean(score**2)) < 1.6
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("", "track"),
+        ("frame,row\n1,2\n", "tip_row_px"),
+        ("frame,tip_row_px\n", "tip_row_px"),
+        ("frame,tip_row_px\n0,1\n0,2\n", "frame"),
+        ("frame,tip_row_px\n0,1\n1,abc\n", "tip_row_px"),
+        ("frame,tip_row_px\n0.5,1\n1,2\n", "frame"),
+    ],
+)
+def test_bad_tables_are_named(tmp_path, text, key) -> None:
+    path = tmp_path / "track.csv"
+    path.write_text(text)
+    with pytest.raises(MeasurementError, match=key):
+        read_track(path, CAMERA, 0.05)
+
+
+def test_never_reaching_the_surface_is_an_error() -> None:
+    track, _ = make_track(7)
+    with pytest.raises(MeasurementError, match="never reaches the surface"):
+        fit_deceleration(track, Camera(RATE, PIXEL, 900.0, 0.1))
+
+
+def test_track_survives_its_file(tmp_path) -> None:
+    track, _ = make_track(8, drop=(5,))
+    again = read_track(write_track(track, tmp_path / "track.csv"), CAMERA, None)
+    assert np.allclose(again.tip_row, track.tip_row, atol=1e-5) and np.allclose(again.sigma, track.sigma)
+    assert np.array_equal(again.frame, track.frame)
