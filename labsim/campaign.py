@@ -72,10 +72,7 @@ def read_campaign(folder: Path | str) -> Campaign:
     drops = tuple(read_drop(path) for path in _list_parts(folder / "drops", "drop.toml"))
     if not drops:
         raise CampaignError(folder / "drops", "", "holds no drop; add drops/D01/drop.toml")
-    scans, published_scans = [], []
-    for path in _list_parts(folder / "ct", "scan.toml"):
-        scan = read_scan(path)
-        (scans if isinstance(scan, Scan) else published_scans).append(scan)
+    read_scans = [read_scan(path) for path in _list_parts(folder / "ct", "scan.toml")]
     _check_sequence(folder, drops)
     for wanted in planar.calibration_drops:
         if wanted not in {drop.name for drop in drops}:
@@ -92,10 +89,10 @@ def read_campaign(folder: Path | str) -> Campaign:
         material=material,
         p_m_range=p_m_range,
         gravity=gravity,
-        geometry=geometry,
+        geometry=geometry,  # type: ignore[arg-type]
         drops=drops,
-        scans=tuple(scans),
-        published_scans=tuple(published_scans),
+        scans=tuple(scan for scan in read_scans if isinstance(scan, Scan)),
+        published_scans=tuple(scan for scan in read_scans if isinstance(scan, PublishedScan)),
         planar=planar,
         source=source,
     )

@@ -13,7 +13,7 @@ import keyword
 import pkgutil
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -73,7 +73,7 @@ def _root(
 
 
 # the base of all complaints about the command line itself; typer brings its own copy of click or uses the installed one
-_UsageTrouble = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
+_UsageTrouble: Any = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

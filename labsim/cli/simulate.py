@@ -148,7 +148,7 @@ def simulate(
             spacing=spacing or radius / 8.0,
             depth=None,
         )
-    unseen = []
+    unseen: list[str] = []
     if extended is not None and model is not None:
         setting, unseen = _extend(setting, extended, model, read, chosen, known)
     if time_ms is not None:

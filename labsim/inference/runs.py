@@ -152,7 +152,7 @@ class RunStore:
     def _run_missing(
         self, executor: Executor, slots: int, todo: list[tuple[str, DropSetting]]
     ) -> Iterator[tuple[str, DropRun | FailedRun]]:
-        running: dict[Future, tuple[str, DropSetting, filelock.BaseFileLock]] = {}
+        running: dict[Future, tuple[str, DropSetting, filelock.FileLock]] = {}
         elsewhere: list[tuple[str, DropSetting]] = []
         try:
             while todo or running or elsewhere:

@@ -369,7 +369,7 @@ def _integrate(
     likelihood: _Likelihood, limits: tuple[float, float], use: tuple[str, ...], depth_reading: str, k0: float
 ) -> Reading:
     """The same posterior by quadrature: one parameter needs no chain."""
-    ln_p_m = np.linspace(*np.log(limits), 2001)
+    ln_p_m = np.linspace(math.log(limits[0]), math.log(limits[1]), 2001)
     log_like = likelihood(ln_p_m)
     density = np.exp(log_like - log_like.max())
     total = cumulative_trapezoid(density, ln_p_m, initial=0.0)

@@ -191,6 +191,18 @@ def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
         RunStore(tmp_path).get_many([small_drop()], scheduler="tcp://127.0.0.1:1")
 
 
+def test_a_dask_scheduler_does_the_same_runs(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        store = RunStore(tmp_path / "dask")
+        settings = [small_drop(0.2), small_drop(0.3)]
+        found = require_runs(store.get_many(settings, scheduler=cluster.scheduler_address))
+    here = require_runs(RunStore(tmp_path / "here").get_many(settings, workers=1))
+    assert store.new == 2 and all(same(a, b) for a, b in zip(found, here, strict=True))
+
+
 def test_extrapolation_finds_the_value_at_zero_spacing() -> None:
     class Run:
         def __init__(self, setting: DropSetting) -> None:
