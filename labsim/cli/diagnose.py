@@ -63,6 +63,7 @@ def diagnose(
 def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:
     """Files of a calibration and its diagnosis; the summary and the lines for people."""
     from ..report.figures import draw_compacted_volume, draw_density_field, draw_depth_law, draw_penetration
+    from ..report.summary_page import write_page
     from ..report.tables import diagnosis_lines, diagnosis_summary
 
     calibration = found.calibration
@@ -84,4 +85,5 @@ def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:
     draw_depth_law(found, folder / "depth_law.png")
     draw_compacted_volume(found, folder / "compacted_volume.png")
     draw_density_field(calibration.finest_run, folder / "density_field.png")
+    write_page(found, folder)
     return summary, diagnosis_lines(found)

@@ -69,7 +69,8 @@ def diagnosis_lines(diagnosis: SummaryDiagnosis) -> str:
     for row in diagnosis.predictions:
         mark = "calibrated on" if row.used else "MISSED" if row.missed else "kept"
         lines.append(
-            f"  {row.name:26s}{_value(row, 'observed'):>22s}{_value(row, 'predicted'):>22s}{row.deviation:>+10.1f} σ  {mark}"
+            f"  {row.name:26s}{value_text(row, 'observed'):>22s}{value_text(row, 'predicted'):>22s}"
+            f"{row.deviation:>+10.1f} σ  {mark}"
         )
     if (scaling := diagnosis.scaling) is not None:
         small, large = 2e3 * scaling.small, 2e3 * scaling.large
@@ -82,11 +83,15 @@ def diagnosis_lines(diagnosis: SummaryDiagnosis) -> str:
     if diagnosis.exponents:
         found = ", ".join(f"{n:.2f} ± {s:.2f} ({2e3 * r:g} mm)" for r, (n, s) in diagnosis.exponents.items())
         lines.append(f"  D ∝ (m v/A)^n: published n = 1; simulation {found}")
-    lines += [
-        "",
-        f"verdict: {diagnosis.verdict} (p = {diagnosis.p_value:.2g} for all predictions together): {VERDICTS[diagnosis.verdict]}",
-    ]
+    lines += ["", verdict_text(diagnosis)]
     return "\n".join(lines + warning_lines(diagnosis.warnings))
+
+
+def verdict_text(diagnosis: SummaryDiagnosis) -> str:
+    return (
+        f"verdict: {diagnosis.verdict} (p = {diagnosis.p_value:.2g} for all predictions together): "
+        f"{VERDICTS[diagnosis.verdict]}"
+    )
 
 
 def warning_lines(warnings: tuple[str, ...]) -> list[str]:
@@ -192,7 +197,8 @@ def _row(row: Prediction) -> dict[str, Any]:
     }
 
 
-def _value(row: Prediction, which: str) -> str:
+def value_text(row: Prediction, which: str) -> str:
+    """``observed`` or ``predicted`` of a row with its sigma, in the unit people use."""
     factor, unit, digits = people(row)
     value, sigma = getattr(row, which) * factor, getattr(row, f"{which}_sigma") * factor
     short = {"sphere volumes": "V", "1e-4 m² s/kg": "e-4"}.get(unit, unit)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -161,3 +162,18 @@ def test_the_default_output_is_a_new_folder_beside_the_input(tmp_path: Path) -> 
     (first / "file").write_text("")
     assert make_output_folder(None, campaign, "calibrate") == tmp_path / "series-calibrate-2"
     assert make_output_folder(None, campaign / "drops" / "D01", "track") == tmp_path / "series-D01-track"
+
+
+def test_a_new_campaign_needs_only_its_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "series"
+    assert call("new", str(folder)) == 0
+    assert call("check", str(folder)) == 2
+    assert "the track is empty" in capsys.readouterr().err
+    with (folder / "drops/D01/track.csv").open("a") as track:
+        track.write("".join(f"{i},{280 + 2 * i}\n" for i in range(30)))
+    assert call("check", str(folder)) == 2
+    assert "holds no TIFF" in capsys.readouterr().err
+    shutil.rmtree(folder / "ct")
+    assert call("check", str(folder)) == 0
+    assert call("new", str(folder)) == 2
+    assert "not empty" in capsys.readouterr().err

@@ -131,6 +131,8 @@ def test_every_file_is_there(first: tuple[Path, str]) -> None:
         "model.toml",
     ]:
         assert (folder / name).stat().st_size > 300 and name in out
+    page = (folder / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 6 and "http" not in page.lower()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)
         import arviz
