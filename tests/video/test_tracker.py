@@ -1,0 +1,258 @@
+"""The tracker against synthetic recordings with true rows (accuracy goals T1 to T14)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labsim.errors import MeasurementError
+from labsim.records import Camera
+from labsim.video import fit_deceleration, follow_projectile, open_frames
+from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
+
+DATA = Path(__file__).parents[2] / "data" / "video"
+
+
+def record(seed=0, *, contact=45.37, speed=2.3, stop=30.0, count=90, **settings):
+    recording = Recording(**settings)
+    depth, truth = fall_and_stop(count, contact + 0.137 * seed, speed, stop)
+    pictures, rows = render(recording, depth, seed)
+    return recording, pictures, rows, truth
+
+
+def follow(recording, pictures, **options):
+    return follow_projectile(
+        make_frames(pictures, bits=recording.bits, **options), surface_row=recording.surface_row
+    )
+
+
+def bound(recording: Recording) -> float:
+    """Cramér–Rao bound of one straight edge as wide as the rod (px), closed form for edge pixels of mean variance."""
+    contrast = recording.bright - recording.dark
+    variance = recording.read_noise**2 + recording.gain * 0.5 * (recording.bright + recording.dark) + 1 / 12
+    blur = np.sqrt(recording.blur**2 + 1 / 12)
+    return float(np.sqrt(variance) / contrast * np.sqrt(2 * np.sqrt(np.pi) * blur / recording.width))
+
+
+def judge(recording, pictures, rows):
+    seen = follow(recording, pictures)
+    error = seen.track.tip_row - rows
+    return seen, error
+
+
+def test_clean_and_buried() -> None:
+    """T1, T2, T14: rms ≤ 1.5 × bound and ≤ 0.03 px, lock ≤ 0.01 px, slope ≤ 1e-3, no step > 0.02 px, cover 60–76 %."""
+    errors, phases, scores, steps, slopes = [], [], [], [], []
+    for seed in range(20):
+        recording, pictures, rows, _ = record(seed)
+        seen, error = judge(recording, pictures, rows)
+        assert seen.track.valid.all()
+        before, after = rows < recording.surface_row - 6, rows > recording.surface_row + 4
+        steps.append(np.mean(error[after]) - np.mean(error[before]))
+        slopes.append(np.polyfit(rows, error, 1)[0])
+        moving = np.abs(np.gradient(rows)) > 0.05
+        errors.append(error[moving] - error[moving].mean())
+        phases.append(rows[moving] % 1.0)
+        scores.append((error / seen.track.sigma)[moving])
+    error, phase, score = np.concatenate(errors), np.concatenate(phases), np.concatenate(scores)
+    assert np.sqrt(np.mean(error**2)) <= min(1.5 * bound(recording), 0.03)
+    lock = 2 * abs(np.mean(error * np.exp(2j * np.pi * phase)))
+    assert lock <= 0.01
+    assert np.max(np.abs(slopes)) <= 1e-3
+    assert abs(np.mean(steps)) <= 0.01 and np.max(np.abs(steps)) <= 0.02
+    assert 0.60 <= np.mean(np.abs(score) < 1) <= 0.76, np.mean(np.abs(score) < 1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "limit"),
+    [
+        ({"flicker": 0.1, "vignette": 0.3}, 2.0),  # T3
+        ({"surface_lumps": 0.5}, 1.5),
+        ({"tip_radius": 25.0}, 1.5),
+        ({"bead": True, "tip_radius": 30.0}, 2.0),
+        ({"length": 262.0}, 2.0),  # the top end comes into view late
+        ({"dead": 30}, 2.0),  # T11
+        ({"read_noise": 14.0, "gain": 0.0}, 2.0),  # C/s = 10
+    ],
+)
+def test_hard_light(settings, limit) -> None:
+    recording, pictures, rows, _ = record(1, **settings)
+    seen, error = judge(recording, pictures, rows)
+    good = seen.track.valid
+    assert good.mean() > 0.95
+    assert np.std(error[good]) <= limit * bound(recording)
+    assert abs(np.polyfit(rows[good], error[good], 1)[0]) <= 1e-3
+    assert abs(np.mean(error[good])) < max(0.02, bound(recording))
+
+
+@pytest.mark.parametrize("bits", [10, 12, 14, 16])
+def test_bit_depths_agree(bits) -> None:
+    """T4: the same scene in deeper words gives the same rows within 0.005 px."""
+    recording, pictures, rows, _ = record(2)
+    deep, deep_pictures, _, _ = record(2, bits=bits)
+    difference = follow(deep, deep_pictures).track.tip_row - follow(recording, pictures).track.tip_row
+    assert np.sqrt(np.mean(difference**2)) <= 0.005
+
+
+@pytest.mark.parametrize(
+    ("codec", "quality", "limit", "warned"),
+    [("MJPG", 90, 0.02, False), ("MJPG", 50, 0.04, True), ("MJPG", 20, 0.1, True), ("XVID", None, 0.1, True)],
+)
+def test_compression(tmp_path, codec, quality, limit, warned) -> None:
+    """T5."""
+    recording, pictures, rows, _ = record(3)
+    frames = open_frames(write_video(pictures, tmp_path / "drop.avi", codec, quality))
+    seen = follow_projectile(frames, frame_rate=1e4, surface_row=recording.surface_row)
+    error = seen.track.tip_row - rows[: len(seen.track.frame)]
+    assert np.sqrt(np.nanmean(error**2)) <= limit
+    text = " ".join(seen.track.warnings)
+    assert ("quality about" in text or "differences between frames" in text) == warned
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"camera_rotation": 2.0},
+        {"camera_rotation": -5.0, "shape": (384, 160), "column": 80.0},
+        {"tilt": 3.0},
+        {"tilt": -3.0, "drift": 3.0},
+        {"drift": 3.0},
+    ],
+)
+def test_rotated_tilted_drifting(settings) -> None:
+    """T6: slope ≤ 1e-3, and the rows are those along the fall."""
+    recording, pictures, rows, _ = record(4, **settings)
+    seen, error = judge(recording, pictures, rows)
+    good = seen.track.valid
+    assert abs(np.polyfit(rows[good], error[good], 1)[0]) <= 1e-3
+    assert np.sqrt(np.mean(error[good] ** 2)) <= 0.03
+    if "tilt" in settings and seen.tilt is not None:
+        assert np.degrees(seen.tilt) == pytest.approx(settings["tilt"], abs=0.1)
+
+
+def test_camera_on_its_side_and_upside_down() -> None:
+    recording, pictures, rows, _ = record(5)
+    side = [np.ascontiguousarray(np.rot90(p)) for p in pictures]
+    with pytest.raises(MeasurementError, match="--rotate 270"):
+        follow_projectile(make_frames(side))
+    seen = follow_projectile(make_frames(side).turned(270), surface_row=recording.surface_row)
+    assert np.std(seen.track.tip_row - rows) < 0.02
+    with pytest.raises(MeasurementError):
+        follow_projectile(make_frames([np.ascontiguousarray(p[::-1]) for p in pictures]))
+
+
+@pytest.mark.parametrize("settings", [{"stripe": 100.0}, {"glare": 30.0}])
+def test_reflections(settings) -> None:
+    """T7: bias ≤ 0.05 px or a flag."""
+    recording, pictures, rows, _ = record(6, **settings)
+    seen, error = judge(recording, pictures, rows)
+    good = seen.track.valid
+    assert np.abs(np.mean(error[good])) <= 0.05
+    assert np.std(error[good]) <= 0.05
+
+
+def test_spray() -> None:
+    """T8: spray below the top end does no harm; spray that reaches it is flagged, not believed."""
+    recording, pictures, rows, _ = record(7, spray=0.3)
+    seen, error = judge(recording, pictures, rows)
+    assert abs(np.nanmean(error)) <= 0.03 and seen.track.valid.mean() > 0.9
+    recording, pictures, rows, _ = record(7, spray=0.5, spray_height=150.0)
+    seen, error = judge(recording, pictures, rows)
+    assert not seen.track.valid.all()
+    assert np.nanmax(np.abs(error)) < 0.05
+    assert any("disturbed" in reason for reason in seen.track.reason)
+
+
+def test_dropped_and_repeated_frames() -> None:
+    """T9: with the camera's own numbers, gaps and repeats cost nothing and are reported."""
+    dropped = (20, 52, 53, 60)
+    recording, pictures, rows, truth = record(8, dropped=dropped)
+    numbers = np.setdiff1d(np.arange(90), dropped)
+    frames = make_frames(pictures, numbers=numbers)
+    track = follow_projectile(frames, surface_row=recording.surface_row).track
+    camera = Camera(1e4, 20e-6, recording.surface_row, 0.0)
+    curve = fit_deceleration(track, camera)
+    assert curve.stopping_time.value == pytest.approx(truth["stop"] * 1e-4, abs=2e-5)
+
+    recording, pictures, rows, truth = record(8, duplicated=(30, 55))
+    pictures = [p for i, p in enumerate(pictures) if i not in (32, 58)]  # the repeat took the next frame's place
+    track = follow_projectile(make_frames(pictures), surface_row=recording.surface_row).track
+    assert {31, 56} & set(np.flatnonzero(~track.valid)) and any("repeat" in text for text in track.warnings)
+    curve = fit_deceleration(track, camera)
+    assert curve.stopping_time.value == pytest.approx(truth["stop"] * 1e-4, abs=2e-5)
+
+
+def test_quantised_stamps_and_wrong_header() -> None:
+    """T9: stamps win over a header that is ten times wrong, and one microsecond of grain does not matter."""
+    recording, pictures, _, truth = record(9)
+    stamps = np.round(np.arange(90) * 1e-4, 6)
+    frames = make_frames(pictures, rate=1e5, stamps=stamps)
+    track = follow_projectile(frames, surface_row=recording.surface_row).track
+    curve = fit_deceleration(track, Camera(1e4, 20e-6, recording.surface_row, 0.0))
+    assert curve.stopping_time.value == pytest.approx(truth["stop"] * 1e-4, abs=2e-5)
+
+
+def test_top_end_never_in_view() -> None:
+    """T10: no position and a reason, once the tip is buried and the top end is not in the picture."""
+    recording, pictures, rows, _ = record(10, length=400.0)
+    track = follow(recording, pictures).track
+    buried = rows > recording.surface_row + 2
+    assert not track.valid[buried].any()
+    assert all(track.reason[i] for i in np.flatnonzero(buried))
+    assert track.valid[rows < recording.surface_row - 12].all()
+
+
+def test_saturated_background_is_said() -> None:
+    """T11."""
+    recording, pictures, rows, _ = record(11, bright=262.0, vignette=0.0)
+    seen, error = judge(recording, pictures, rows)
+    assert np.std(error[seen.track.valid]) <= 2 * bound(recording)
+    assert any("saturated" in text for text in seen.track.warnings)
+
+
+def test_little_contrast() -> None:
+    """T12: C/s = 5 works with an error bar that fits, below 4 is refused."""
+    recording, pictures, rows, _ = record(12, read_noise=30.0, gain=0.0)
+    seen, error = judge(recording, pictures, rows)
+    good = seen.track.valid
+    assert good.mean() > 0.5
+    assert 0.5 < np.std(error[good]) / np.median(seen.track.sigma[good]) < 1.8
+    recording, pictures, rows, _ = record(12, read_noise=50.0, gain=0.0)
+    with pytest.raises(MeasurementError, match="below 4 times the noise"):
+        follow(recording, pictures)
+
+
+def test_end_to_end() -> None:
+    """T13 from pixels: v0 0.3 %, t0 and T_s 0.02 ms, D 0.5 %."""
+    for seed in range(4):
+        recording, pictures, _, truth = record(20 + seed, speed=4.0)
+        track = follow(recording, pictures).track
+        curve = fit_deceleration(track, Camera(1e4, 20e-6, recording.surface_row, 0.0))
+        assert curve.impact_speed.value == pytest.approx(truth["speed"] * 0.2, rel=0.003)
+        assert curve.contact_time.value == pytest.approx(truth["contact"] * 1e-4, abs=2e-5)
+        assert curve.stopping_time.value == pytest.approx(truth["stop"] * 1e-4, abs=2e-5)
+        assert curve.penetration_depth.value == pytest.approx(truth["depth"] * 20e-6, rel=0.005)
+
+
+@pytest.mark.parametrize("name", ["ffv1", "mjpeg_3mm", "mjpeg"])
+def test_rendered_drops(name) -> None:
+    """Videos from an independent renderer: ≤ 0.05 px rms against the true rows, nothing taken out of the mean."""
+    folder = DATA / "rendered_drops"
+    truth = json.loads((folder / "truth.json").read_text())[name]
+    seen = follow_projectile(open_frames(folder / name / "video.avi"), frame_rate=1e4)
+    error = seen.track.tip_row - np.array(truth["rows"])
+    assert seen.track.valid.all()
+    assert np.sqrt(np.mean(error**2)) <= 0.05
+    assert 0.6 < np.std(error / seen.track.sigma) < 1.5
+
+
+def test_nothing_to_track() -> None:
+    rng = np.random.default_rng(0)
+    noise = [np.clip(rng.normal(150, 3, (100, 80)), 0, 255).astype(np.uint8) for _ in range(30)]
+    with pytest.raises(MeasurementError):
+        follow_projectile(make_frames(noise))
+    with pytest.raises(MeasurementError, match="at least 12"):
+        follow_projectile(make_frames(noise[:5]))
