@@ -89,6 +89,7 @@ def simulate(
         Path | None, typer.Option("--campaign", help="Take the setting from this campaign.")
     ] = None,
     drop: Annotated[str | None, typer.Option("--drop", help="Name of the campaign's drop, as D01.")] = None,
+    movie: Annotated[bool, typer.Option("--movie", help="Write run.mp4 too (simulates once more).")] = False,
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
     store: options.Store = None,
@@ -162,6 +163,10 @@ def simulate(
         found = RunStore(store).get_many(plan, workers=workers, scheduler=scheduler, progress=progress)
     runs = require_runs(found)
     summary, lines = write_run(runs, folder)
+    if movie:
+        from ..report.movie import draw_movie
+
+        draw_movie(min(runs, key=lambda each: each.setting.spacing), folder / "run.mp4")
     lines = "\n".join([lines, *unseen])
     options.finish(summary, f"{lines}\nwritten to {folder}", as_json=as_json, quiet=quiet)
 

@@ -22,7 +22,8 @@ from scipy.spatial import KDTree
 from ..diagnosis.summary import SummaryDiagnosis, compacted_area
 from ..inference.planar import expected_raw_depth, round_depth
 from ..inference.summary import SummaryCalibration, impact_speed
-from ..sph import DropRun
+from ..records import FloatArray
+from ..sph import DropRun, DropSetting
 
 INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
 STYLE: Any = {
@@ -199,15 +200,35 @@ def draw_compacted_volume(diagnosis: SummaryDiagnosis, path: Path) -> Path:
 
 
 def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Path:
-    """Filling factor of every particle at the end of a run, with the projectile's outline."""
-    setting = run.setting
-    radius = setting.projectile.tip_radius
+    """Filling factor of every particle at the stop of a run, with the projectile's outline."""
     dust = run.particles
-    across, z, phi = dust.r, dust.z, dust.filling_factor
+    with new_figure(path, 6.8, 4.4) as figure:
+        fill_density_field(
+            figure,
+            run.setting,
+            (dust.r, dust.z, dust.filling_factor),
+            run.penetration_depth,
+            run.penetration_depth,
+            title or f"at the stop, {run.stopping_time * 1e3:.2f} ms",
+        )
+    return path
+
+
+def fill_density_field(
+    figure: Figure,
+    setting: DropSetting,
+    dust: tuple[FloatArray, FloatArray, FloatArray],
+    depth: float,
+    deepest: float,
+    when: str,
+) -> None:
+    """The field into a figure. dust: r (or x), z in m and filling factor, (n,) each; depth of the tip now and at most."""
+    across, z, phi = dust
+    radius = setting.projectile.tip_radius
     if setting.geometry == "axisymmetric":
         across, z, phi = np.concatenate([-across, across]), np.tile(z, 2), np.tile(phi, 2)
     half = 4.5 * radius
-    deep = run.penetration_depth + 3.0 * radius
+    deep = deepest + 3.0 * radius
     # each point shows the nearest particle; a spacing away, above the surface half of one, there is no dust
     step = setting.spacing / 3.0
     columns = np.arange(-half, half + step, step)
@@ -217,31 +238,27 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
     )
     reach = np.where(rows > 0.0, 0.5, 1.0)[:, None] * setting.spacing
     field = np.where(distance < reach, phi[nearest], np.nan)
-    with new_figure(path, 6.8, 4.4) as figure:
-        axes = figure.add_subplot()
-        drawn = axes.pcolormesh(
-            columns * 1e3, rows * 1e3, field, cmap="viridis", vmin=0.12, vmax=0.30, rasterized=True
-        )
-        centre = radius - run.penetration_depth
-        angle = np.linspace(0.0, 2 * np.pi, 181)
-        if setting.projectile.tip == "hemisphere":
-            angle = np.linspace(np.pi, 2 * np.pi, 91)
-        x, y = radius * np.cos(angle), centre + radius * np.sin(angle)
-        if setting.projectile.tip == "hemisphere":
-            top = max(2.0 * radius, centre + radius)
-            x, y = np.concatenate([[-radius], x, [radius]]), np.concatenate([[top], y, [top]])
-        axes.fill(x * 1e3, y * 1e3, facecolor="#DDDDDD", edgecolor=INK, lw=1.2)
-        axes.axhline(0.0, color=INK, lw=0.6, ls=":")
-        axes.set(aspect="equal", xlabel="mm", ylabel="height above the undisturbed surface (mm)")
-        axes.set_xlim(-half * 1e3, half * 1e3)
-        axes.set_ylim(-deep * 1e3, 1.2 * radius * 1e3)
-        figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
-        axes.set_title(
-            title
-            or f"{2e3 * radius:g} mm at {setting.impact_speed:g} m/s, p_m {setting.material.p_m / 1e3:.2f} kPa, "
-            f"at the stop, {run.stopping_time * 1e3:.1f} ms"
-        )
-    return path
+    axes = figure.add_subplot()
+    drawn = axes.pcolormesh(
+        columns * 1e3, rows * 1e3, field, cmap="viridis", vmin=0.12, vmax=0.30, rasterized=True
+    )
+    centre = radius - depth
+    angle = np.linspace(0.0, 2 * np.pi, 181)
+    if setting.projectile.tip == "hemisphere":
+        angle = np.linspace(np.pi, 2 * np.pi, 91)
+    x, y = radius * np.cos(angle), centre + radius * np.sin(angle)
+    if setting.projectile.tip == "hemisphere":
+        top = max(2.0 * radius, centre + radius)
+        x, y = np.concatenate([[-radius], x, [radius]]), np.concatenate([[top], y, [top]])
+    axes.fill(x * 1e3, y * 1e3, facecolor="#DDDDDD", edgecolor=INK, lw=1.2)
+    axes.axhline(0.0, color=INK, lw=0.6, ls=":")
+    axes.set(aspect="equal", xlabel="mm", ylabel="height above the undisturbed surface (mm)")
+    axes.set_xlim(-half * 1e3, half * 1e3)
+    axes.set_ylim(-deep * 1e3, 1.2 * radius * 1e3)
+    figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
+    axes.set_title(
+        f"{2e3 * radius:g} mm at {setting.impact_speed:g} m/s, p_m {setting.material.p_m / 1e3:.2f} kPa, {when}"
+    )
 
 
 def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:

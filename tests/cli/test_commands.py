@@ -63,7 +63,7 @@ def test_simulate_writes_what_the_contract_says(tmp_path: Path, capsys: pytest.C
 
 
 def test_several_spacings_are_extrapolated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call("simulate", "-o", str(tmp_path), "--spacings", "2", *QUICK) == 0
+    assert call("simulate", "-o", str(tmp_path), "--spacings", "2", "--movie", *QUICK) == 0
     out = capsys.readouterr().out
     summary = json.loads((tmp_path / "run.json").read_text())
     assert summary["penetration_depth_m_sigma"] > 0.0 and summary["stopping_time_s_sigma"] > 0.0
@@ -71,6 +71,7 @@ def test_several_spacings_are_extrapolated(tmp_path: Path, capsys: pytest.Captur
     ratio = 2**0.5
     assert summary["penetration_depth_m"] == pytest.approx((ratio * fine - coarse) / (ratio - 1))
     assert "extrapolated from 2 spacings" in out
+    assert (tmp_path / "run.mp4").stat().st_size > 20_000
 
 
 def test_a_drop_of_a_campaign_and_a_model_file(tmp_path: Path) -> None:

@@ -1,0 +1,52 @@
+"""A run as a movie: the filling factor around the projectile from contact to the stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+
+from ..records import FloatArray
+from ..sph import DropRun, particles
+from ..sph.drop import evolve
+from ..video.movie import write_movie
+from .figures import STYLE, fill_density_field
+
+PICTURES = 60
+
+
+def draw_movie(run: DropRun, path: Path) -> Path:
+    """run.mp4. A stored run holds the dust at the stop only, so the drop is simulated once more for this."""
+    setting = run.setting
+    dust, wall = particles.place_particles(setting)
+    body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
+    seen: list[tuple[float, float, FloatArray]] = []
+    kept = [particles.X, particles.Z, particles.DENSITY]
+
+    def watch(time: float, state: FloatArray) -> None:
+        if time >= len(seen) * run.stopping_time / PICTURES:
+            seen.append((time, -float(body[0]), state[kept].copy()))
+
+    evolve(setting, dust, wall, body, watch)
+    return write_movie(_draw(run, seen), path)
+
+
+def _draw(run: DropRun, seen: list[tuple[float, float, FloatArray]]) -> Iterator[npt.NDArray[np.uint8]]:
+    for time, depth, (x, z, density) in seen:
+        with plt.rc_context(STYLE):
+            figure = plt.figure(figsize=(6.8, 4.4), layout="constrained")
+            fill_density_field(
+                figure,
+                run.setting,
+                (x, z, density / run.setting.monomer_density),
+                depth,
+                run.penetration_depth,
+                f"{time * 1e3:.2f} ms",
+            )
+            figure.canvas.draw()
+            picture = np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
+            plt.close(figure)
+        yield picture
