@@ -72,6 +72,10 @@ def measure_ruler(
     residual = (c - slope * number - offset)[keep]
     spread = float(np.std(residual, ddof=2))
     sigma = spread / np.sqrt(np.sum((number[keep] - number[keep].mean()) ** 2))
+    if spread > 0.1 * slope or np.mean(np.diff(number) == 1) < 0.7:
+        raise MeasurementError(
+            name, "ruler", "no row of evenly spaced ticks found; show the ruler alone and level"
+        )
     warnings = []
     if spread > 0.3:
         warnings.append(f"ticks lie {spread:.2f} px off a straight scale: distorted or tilted ruler")

@@ -14,7 +14,9 @@ RATE, PIXEL = 10_000.0, 20e-6
 CAMERA = Camera(RATE, PIXEL, 300.0, 0.0)
 
 
-def make_track(seed=0, sigma=0.02, *, speed=0.8, stop=3e-3, contact=6.0e-3, count=150, rebound=0.0, shape=0.4, drop=()):
+def make_track(
+    seed=0, sigma=0.02, *, speed=0.8, stop=3e-3, contact=6.0e-3, count=150, rebound=0.0, shape=0.4, drop=()
+):
     rng = np.random.default_rng(seed)
     t = np.arange(count) / RATE
     z = evaluate_motion(t - contact, speed, stop, 9.81, shape)
@@ -86,7 +88,9 @@ def test_outliers_and_gaps() -> None:
     track, depth = make_track(2, 0.03, drop=(20, 21, 75, 76, 77))
     row = track.tip_row.copy()
     row[[10, 60, 90]] += [4.0, -7.0, 1.0]
-    curve = fit_deceleration(Track(track.frame, track.time, row, track.sigma, track.valid, track.reason), CAMERA)
+    curve = fit_deceleration(
+        Track(track.frame, track.time, row, track.sigma, track.valid, track.reason), CAMERA
+    )
     assert any("outliers" in text for text in curve.warnings)
     assert not curve.used[[10, 60]].any()
     assert curve.penetration_depth.value == pytest.approx(depth, rel=0.005)

@@ -63,7 +63,10 @@ def read_picture(path: Path) -> np.ndarray:
     """One grey picture, uint8 or uint16. Raises MeasurementError."""
     try:
         if path.suffix.lower() in {".tif", ".tiff"}:
-            return make_grey(tifffile.imread(path), path)
+            try:
+                return make_grey(tifffile.imread(path), path)
+            except ValueError:  # a compression that tifffile leaves to a package of its own
+                pass
         picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE)
     except MeasurementError:
         raise

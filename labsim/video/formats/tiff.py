@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ...errors import MeasurementError
 from ..frames import Frames
 
 NAME = "multipage TIFF"
+logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # damage is reported by labsim, in its own words
 
 
 def recognises(path: Path) -> bool:
