@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -45,8 +46,9 @@ def open_executor(workers: int | None, scheduler: str | None, wanted: int) -> It
     try:
         yield pool, count
     except BaseException:
+        workers_now = list((pool._processes or {}).values())  # shutdown forgets them
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in list((pool._processes or {}).values()):
+        for process in workers_now:
             process.terminate()  # a run of minutes is not waited for when the user stops
         raise
     else:
@@ -76,7 +78,8 @@ def count_cores() -> int:
 
 
 def _begin_worker() -> None:
-    """One thread a run; and leave when the parent is gone, even when it was killed without a word."""
+    """One thread a run; leave when the parent is gone, even when it was killed without a word; Ctrl-C is the parent's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     parent = multiprocessing.parent_process()

@@ -1,0 +1,170 @@
+"""``diagnose``: measured campaign in; what its simulation gets wrong, why, and what the extension is worth, out."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..inference.calibrate import estimate_scatter, prepare, sample_fit
+from ..inference.fitting import Fit, Hypothesis, Workbench, fit_hypothesis
+from ..inference.posterior import Posterior
+from ..inference.runs import Progress, RunStore
+from ..records import Campaign
+from .gain import Gain, HeldOut, measure_gain, predict_held_out
+from .judge import Verdict, judge
+from .screen import Screening, screen
+from .unknown import UnknownFit, fit_unknown
+
+CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
+MOST_RERUN = 6  # effects that cost runs
+MOST_PAIRS = 3
+CONFUSABLE = 0.9  # cosine of fingerprints
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything diagnose found; report.tables writes it as diagnosis.json."""
+
+    campaign: Campaign
+    bench: Workbench
+    nominal: Fit
+    rivals: list[Fit]
+    screening: Screening
+    unknown: UnknownFit
+    verdict: Verdict
+    p_value: float
+    confusable: list[tuple[str, str, float]]
+    held_out_nominal: HeldOut
+    held_out_extended: HeldOut
+    gain: Gain
+    posterior_nominal: Posterior
+    posterior_extended: Posterior
+    best: Fit
+    scatter: tuple[float, float]
+    runs_new: int
+    runs_reused: int
+    wall: float
+    warnings: tuple[str, ...]
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    store: RunStore,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 1,
+    progress: Progress | None = None,
+    use_scans: bool = True,
+    cells: int | None = None,
+) -> Diagnosis:
+    """Measure, calibrate, screen, confirm, judge. Raises LabsimError subclasses as its parts do."""
+    began = time.perf_counter()
+    random = np.random.default_rng(seed)
+    bench, nominal = prepare(
+        campaign,
+        store,
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+        use_scans=use_scans,
+        cells=cells,
+    )
+    screening = screen(bench, nominal, random)
+    unknown = fit_unknown(bench, nominal)
+    rivals = confirm_singles(bench, nominal, screening)
+    rivals += confirm_pairs(bench, nominal, rivals, screening)
+    verdict = judge(
+        nominal,
+        rivals,
+        unknown.evidence,
+        list(bench.effects),
+        {score.name: score.log_bayes for score in screening.scores},
+    )
+    best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
+    named = [fit for fit in rivals if fit.hypothesis == verdict.probabilities[0][0]]
+    best = named[0] if named else best
+    freedom = max(nominal.points - 1 - 2 * len(bench.models), 1)
+    omnibus = float(chi2.sf(nominal.chi_square, freedom))
+    p_value = min(1.0, 2.0 * min(screening.p_value, omnibus))
+    held_nominal = predict_held_out(bench, nominal)
+    held_best = predict_held_out(bench, best)
+    scatter = estimate_scatter(bench, nominal)
+    warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
+    low, high = campaign.p_m_range
+    if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
+        warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")
+    return Diagnosis(
+        campaign,
+        bench,
+        nominal,
+        rivals,
+        screening,
+        unknown,
+        verdict,
+        p_value,
+        list_confusable(screening),
+        held_nominal,
+        held_best,
+        measure_gain(held_nominal, held_best),
+        sample_fit(bench, nominal, seed=seed, progress=progress),
+        sample_fit(bench, best, seed=seed, progress=progress),
+        best,
+        scatter,
+        store.new,
+        store.reused,
+        time.perf_counter() - began,
+        tuple(warnings),
+    )
+
+
+def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> list[Fit]:
+    """Re-simulate the effects that the screening cannot exclude; effects of the measurement cost nothing and are all fitted."""
+    if not screening.scores:
+        return []
+    top = screening.scores[0].log_bayes
+    close = [score for score in screening.scores if score.log_bayes > max(top - CLOSE, -1.0)]
+    costly = [score for score in close if bench.costs_runs(score.name)][:MOST_RERUN]
+    free = [score for score in screening.scores if not bench.costs_runs(score.name)]
+    fits = []
+    for score in [*free, *costly]:
+        reach = 2 * abs(bench.effects[score.name].amplitudes[0].step)
+        start = float(np.clip(score.amplitude, -reach, reach))
+        fits.append(fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start})))
+    return fits
+
+
+def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening) -> list[Fit]:
+    """Pairs made of the best single and others, where the best single leaves more than noise."""
+    if not singles:
+        return []
+    ranked = sorted(singles, key=lambda fit: -fit.evidence)
+    first = ranked[0]
+    freedom = max(first.points - 2 - 2 * len(bench.models), 1)
+    if first.evidence < nominal.evidence + 3 or chi2.sf(first.chi_square, freedom) > 0.05:
+        return []
+    pairs: list[Hypothesis] = []
+    lead = first.hypothesis[0]
+    again = screen(bench, first, np.random.default_rng(0), [n for n in bench.effects if n != lead])
+    for score in again.scores[:MOST_PAIRS]:
+        if score.log_bayes > 0:
+            pairs.append((lead, score.name))
+    return [
+        fit_hypothesis(bench, pair, (first.log_p_m, {**first.values, pair[1]: 0.0}), models=first.models)
+        for pair in pairs
+    ]
+
+
+def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:
+    """Pairs whose fingerprints are nearly parallel in this campaign, known before any data are looked at."""
+    found = []
+    for i, first in enumerate(screening.names):
+        for j in range(i + 1, len(screening.names)):
+            cosine = float(screening.cosines[i, j])
+            if abs(cosine) > CONFUSABLE:
+                found.append((first, screening.names[j], cosine))
+    return sorted(found, key=lambda item: -abs(item[2]))

@@ -1,0 +1,79 @@
+"""Which further measurement would best tell the remaining causes apart: expected information, in bits.
+
+Each hypothesis still standing predicts every candidate; candidates are drops of the families at speeds on the grid, repeats
+included. The expected information is bounded below by Kolchinsky & Tracey (2017), Entropy 19, 361, for Gaussians of equal
+covariance: -Σ p_j ln Σ p_k exp(-D²_jk/8).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..inference.fitting import Fit, Workbench
+from ..records import FloatArray
+
+SMALLEST = 0.005  # probability below which a hypothesis is left out
+POINTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])  # fractions of the stop that are compared
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    change: str
+    information_bits: float
+
+
+def suggest(bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ...], float]) -> list[Suggestion]:
+    """Best first. fits: hypotheses with a prediction (the nominal one has the empty name)."""
+    standing = [fit for fit in fits if probabilities.get(fit.hypothesis or ("none",), 0.0) > SMALLEST]
+    if len(standing) < 2:
+        return []
+    weight = np.array([probabilities[fit.hypothesis or ("none",)] for fit in standing])
+    weight /= weight.sum()
+    found = []
+    for number, family in enumerate(bench.families):
+        if family.is_scan:
+            continue
+        for speed in family.speeds[1:]:
+            means = np.stack([_predict(bench, fit, number, speed) for fit in standing])
+            spread = _spread(bench, standing, number, speed, means.mean(axis=0))
+            difference = means[:, None, :] - means[None, :, :]
+            inverse = np.linalg.inv(spread)
+            distance = np.einsum("jki,il,jkl->jk", difference, inverse, difference)
+            bits = -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+            p = family.projectile
+            found.append(
+                Suggestion(
+                    f"one more drop with the {2e3 * p.tip_radius:.3g} mm tip of {p.mass * 1e6:.3g} mg at {speed:.2f} m/s "
+                    f"(height {speed**2 / 2 / 9.81 * 1e3:.1f} mm)",
+                    round(bits, 3),
+                )
+            )
+    return sorted(found, key=lambda each: -each.information_bits)[:5]
+
+
+def _predict(bench: Workbench, fit: Fit, number: int, speed: float) -> FloatArray:
+    """Depths (m) on the stated scale at fractions of the stop that the fit itself predicts, and the stop (s, as a length)."""
+    code = bench.tables[number].code(fit.log_p_m, math.log(speed), fit.values)
+    instrument = next(iter(bench.instruments(fit.values).values()))
+    depth, stop = math.exp(code[0]), math.exp(code[1])
+    shape = np.interp(POINTS, np.linspace(0, 1, 41), code[2:43])
+    return np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
+
+
+def _spread(bench: Workbench, fits: list[Fit], number: int, speed: float, mean: FloatArray) -> FloatArray:
+    """Covariance of such a measurement: localisation, sample scatter, numerical error, uncertainty of p_m."""
+    base = _predict(bench, fits[0], number, speed)
+    table, moved = bench.tables[number], []
+    code = table.code(fits[0].log_p_m + 0.01, math.log(speed), fits[0].values)
+    depth, stop = math.exp(code[0]), math.exp(code[1])
+    instrument = next(iter(bench.instruments(fits[0].values).values()))
+    shape = np.interp(POINTS, np.linspace(0, 1, 41), code[2:43])
+    moved = np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
+    tangent = (moved - base) / 0.01
+    white = np.median([model.observed.sigma for model in bench.models])
+    variance = bench.terms.scatter**2 + fits[0].covariance[0, 0]
+    numerical = bench.terms.numerical * mean
+    return white**2 * np.eye(len(mean)) + variance * np.outer(tangent, tangent) + np.outer(numerical, numerical)

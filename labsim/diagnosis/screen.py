@@ -1,0 +1,96 @@
+"""Which effects could explain what the nominal fit leaves? Score tests on whitened, projected tangents.
+
+Input: a Workbench and the nominal Fit. Output: a Screening with, for every effect, how far its fingerprint (the tangent after
+ln p_m and all nuisances are taken out) lies along the residual, what amplitude that asks for, and how alike the
+fingerprints are. Formulas: docs/diagnosis.md; Rao's score test, linear Gaussian Bayes factor.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from ..inference.fitting import Fit, Workbench, amplitude_nodes, nearest_nodes, with_probes
+from ..records import FloatArray
+
+DRAWS = 20_000
+
+
+@dataclass(frozen=True)
+class Score:
+    """One effect about null. score : standard normal under the nominal model; signal : length of the fingerprint per unit
+    amplitude; amplitude : what the score asks for; log_bayes : ln Bayes factor against the nominal model, linear."""
+
+    name: str
+    score: float
+    signal: float
+    amplitude: float
+    log_bayes: float
+
+
+@dataclass(frozen=True)
+class Screening:
+    """scores, best first; cosines : (k, k) between fingerprints in the order of ``names``; p_value of the largest score;
+    residual, fingerprints : whitened, projected."""
+
+    scores: list[Score]
+    names: list[str]
+    cosines: FloatArray
+    p_value: float
+    residual: FloatArray
+    fingerprints: FloatArray
+
+
+def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str] | None = None) -> Screening:
+    """Tangents of all effects at the nominal fit (runs at one amplitude and one p_m each) and their scores."""
+    names = [name for name in (names or bench.effects) if bench.effects[name].amplitudes]
+    index = nearest_nodes(fit.log_p_m, share=0.5)[:1]
+    wanted = [
+        (name, amplitude, index[0])
+        for name in names
+        if bench.costs_runs(name)
+        for amplitude in amplitude_nodes(bench, name, 0.0)
+    ]
+    bench.require_changes(wanted, "fingerprints")
+    names = [name for name in names if not bench.costs_runs(name) or _has_runs(bench, name)]
+    linear = with_probes(bench, fit, names)
+    whitened = np.concatenate(
+        [
+            solve_triangular(
+                np.linalg.cholesky(block.covariance),
+                np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1),
+                lower=True,
+            )
+            for block in linear.blocks
+        ]
+    )
+    direction = whitened[:, 1] / np.linalg.norm(whitened[:, 1])
+    projected = whitened - np.outer(direction, direction @ whitened)
+    residual, fingerprints = projected[:, 0], projected[:, 2:]
+    lengths = np.linalg.norm(fingerprints, axis=0)
+    usable = lengths > 1e-9
+    names = [name for name, ok in zip(names, usable, strict=True) if ok]
+    fingerprints, lengths = fingerprints[:, usable], lengths[usable]
+    unit = fingerprints / lengths
+    z = unit.T @ residual
+    scores = []
+    for k, name in enumerate(names):
+        width = bench.effects[name].amplitudes[0].scale
+        snr = (lengths[k] * width) ** 2
+        log_bayes = 0.5 * z[k] ** 2 * snr / (1 + snr) - 0.5 * math.log1p(snr)
+        scores.append(Score(name, float(z[k]), float(lengths[k]), float(z[k] / lengths[k]), float(log_bayes)))
+    cosines = unit.T @ unit
+    largest = float(np.max(z**2)) if len(z) else 0.0
+    root = np.linalg.cholesky(cosines + 1e-9 * np.eye(len(z)))
+    null = np.max((rng.standard_normal((DRAWS, len(z))) @ root.T) ** 2, axis=1)
+    p_value = float((np.sum(null >= largest) + 1) / (DRAWS + 1))
+    scores.sort(key=lambda score: -score.log_bayes)
+    return Screening(scores, names, cosines, p_value, residual, fingerprints)
+
+
+def _has_runs(bench: Workbench, name: str) -> bool:
+    tables = [*bench.tables, *(scan.table for scan in bench.scans)]
+    return all(any(entry for entry in table.changes.get(name, {}).values()) for table in tables)

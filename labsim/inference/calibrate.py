@@ -1,0 +1,211 @@
+"""The posterior of p_m, and of any named effects' parameters, from the tracks and maps of a campaign."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.stats import chi2
+
+from ..ct.reduce import reduce_scan
+from ..effects import list_effects
+from ..errors import InferenceError
+from ..records import Campaign, FloatArray
+from .fitting import Fit, Workbench, fit_hypothesis, linearise_at, open_workbench
+from .likelihood import Terms
+from .observe import observe_drops
+from .posterior import Posterior, measure_residual, sample
+from .runs import Progress, RunStore
+from .scans import ObservedScan, observe_scan
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What calibrate found. scatter : of ln p_m between samples, estimated here, with its standard uncertainty."""
+
+    campaign: Campaign
+    bench: Workbench
+    fit: Fit
+    posterior: Posterior
+    scatter: float
+    scatter_sigma: float
+    p_value: float
+    runs_new: int
+    runs_reused: int
+    wall: float
+    warnings: tuple[str, ...]
+
+
+def measure_scans(campaign: Campaign) -> list[ObservedScan]:
+    return [observe_scan(reduce_scan(scan)) for scan in campaign.scans]
+
+
+def prepare(
+    campaign: Campaign,
+    store: RunStore,
+    *,
+    terms: Terms | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    use_scans: bool = True,
+    cells: int | None = None,
+) -> tuple[Workbench, Fit]:
+    """Measure the campaign, fit the nominal model, estimate the scatter between samples and fit again."""
+    drops = observe_drops(campaign)
+    scans = measure_scans(campaign) if use_scans else []
+    effects = list_effects(campaign.folder)
+    bench = open_workbench(
+        campaign,
+        store,
+        effects,
+        terms=terms,
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+        drops=drops,
+        scans=scans,
+        cells=cells,
+    )
+    middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
+    return bench, fit_hypothesis(bench, (), (min(middle, math.log(1414.0)), {}))
+
+
+def calibrate(
+    campaign: Campaign,
+    parameters: Sequence[str] = ("p_m",),
+    *,
+    store: RunStore | None = None,
+    start: Mapping[str, float] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 1,
+    progress: Progress | None = None,
+    backend: Path | None = None,
+    use_scans: bool = True,
+) -> Calibration:
+    """Posterior of p_m (Pa) and of effects named in ``parameters`` ("shear_strength" or "shear_strength.factor").
+
+    start : values of further effects to hold fixed at (from model.toml). Returns a Calibration; its posterior opens with ArviZ.
+    Raises InferenceError for an unknown parameter, MeasurementError and SimulationError as the parts do.
+    """
+    began = time.perf_counter()
+    store = store or RunStore()
+    names = tuple(name.split(".")[0] for name in parameters if name not in ("p_m", "p_m_Pa"))
+    bench, nominal = prepare(
+        campaign, store, workers=workers, scheduler=scheduler, progress=progress, use_scans=use_scans
+    )
+    for name in names:
+        if name not in bench.effects:
+            reason = bench.reasons.get(name, f"is none of {', '.join(sorted(bench.effects))}")
+            raise InferenceError(campaign.folder, f"parameter {name}", reason)
+    fit = fit_hypothesis(bench, names, (nominal.log_p_m, start or {})) if names else nominal
+    posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
+    scatter, sigma = estimate_scatter(bench, fit)
+    p_value = float(chi2.sf(fit.chi_square, max(fit.points - 1 - len(names) - _free(bench), 1)))
+    warnings = []
+    if p_value < 0.05:
+        warnings.append(f"the model does not explain the data (p = {p_value:.2g}); labsim diagnose asks why")
+    return Calibration(
+        campaign,
+        bench,
+        fit,
+        posterior,
+        scatter,
+        sigma,
+        p_value,
+        store.new,
+        store.reused,
+        time.perf_counter() - began,
+        tuple(warnings),
+    )
+
+
+def _free(bench: Workbench) -> int:
+    """Nuisances without a prior of their own: contact time and speed of each drop."""
+    return 2 * len(bench.models)
+
+
+def sample_fit(
+    bench: Workbench,
+    fit: Fit,
+    *,
+    seed: int = 1,
+    backend: Path | None = None,
+    progress: Progress | None = None,
+) -> Posterior:
+    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors."""
+    names = ["p_m_Pa", *(f"{name}.{bench.effects[name].amplitudes[0].name}" for name in fit.hypothesis)]
+    centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
+    sigma = np.sqrt(np.diag(fit.covariance))
+    lowers = [np.linalg.cholesky(block.covariance) for block in fit.linear.blocks]
+
+    def residual(theta: FloatArray) -> FloatArray:
+        values = dict(zip(fit.hypothesis, theta[1:], strict=True))
+        linear = linearise_at(bench, fit.models, float(theta[0]), values)
+        return np.concatenate(
+            [
+                solve_triangular(lower, block.residual, lower=True)
+                for lower, block in zip(lowers, linear.blocks, strict=True)
+            ]
+        )
+
+    quadratic = measure_residual(residual, centre, sigma)
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    parameters = [bench.effects[name].amplitudes[0] for name in fit.hypothesis]
+
+    def log_probability(theta: FloatArray) -> FloatArray:
+        inside = (theta[:, 0] >= low) & (theta[:, 0] <= high)
+        total = np.where(inside, -quadratic(theta), -np.inf)
+        for k, parameter in enumerate(parameters, start=1):
+            total = total + parameter.log_prior(parameter.null + theta[:, k])
+        return total
+
+    nulls = dict(zip(names[1:], (parameter.null for parameter in parameters), strict=True))
+
+    def transform(name: str, values: FloatArray) -> FloatArray:
+        return np.exp(values) if name == "p_m_Pa" else nulls[name] + values
+
+    return sample(
+        log_probability,
+        names,
+        centre,
+        fit.covariance,
+        seed=seed,
+        transform=transform,
+        backend=backend,
+        progress=progress,
+    )
+
+
+def estimate_scatter(bench: Workbench, fit: Fit) -> tuple[float, float]:
+    """Scatter of ln p_m between samples by restricted maximum likelihood, with its standard uncertainty.
+
+    The likelihood is evaluated on a ladder of scatters with everything else as fitted; the drops' offsets enter through the
+    tangent of ln p_m.
+    """
+    ladder = np.array([0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.09, 0.13])
+    linear = fit.linear
+    tangent = linear.tangents["ln_p_m"]
+    used = bench.terms.scatter
+    value = []
+    for scatter in ladder:
+        covariance = linear.covariance.copy()
+        for section in linear.sections.values():
+            column = tangent[section]
+            covariance[section, section] += (scatter**2 - used**2) * np.outer(column, column)
+        lower = np.linalg.cholesky(covariance)
+        white = solve_triangular(lower, np.stack([linear.residual, tangent], axis=1), lower=True)
+        information = white[:, 1] @ white[:, 1]
+        left = white[:, 0] - white[:, 1] * (white[:, 1] @ white[:, 0]) / information
+        value.append(-0.5 * (left @ left) - np.sum(np.log(np.diag(lower))) - 0.5 * math.log(information))
+    weight = np.exp(np.array(value) - max(value))
+    fine = np.linspace(ladder[0], ladder[-1], 2000)
+    density = np.interp(fine, ladder, weight)
+    mean = float(np.sum(fine * density) / np.sum(density))
+    return mean, float(np.sqrt(np.sum((fine - mean) ** 2 * density) / np.sum(density)))

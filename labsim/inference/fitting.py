@@ -1,0 +1,463 @@
+"""Fit p_m, and the amplitudes of any effects, to a whole campaign: ask for runs, interpolate, Gauss-Newton, ask again.
+
+A Hypothesis is a tuple of effect names; the empty one is the nominal model. Runs are asked for at the strength nodes and
+amplitude nodes that enclose the current estimate, so that the answer never rests on extrapolation.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from ..effects import Effect, Instrument, Place, list_places
+from ..errors import InferenceError
+from ..records import Campaign, FloatArray, Projectile
+from .curves import encode_run
+from .forward import ResponseTable
+from .grid import (
+    STRENGTH_ANCHOR,
+    STRENGTH_RATIO,
+    Change,
+    Family,
+    RunGrid,
+    speed_nodes,
+)
+from .likelihood import (
+    DropModel,
+    Linearised,
+    Terms,
+    linearise,
+    make_drop_model,
+    solve_globals,
+    update_nuisances,
+)
+from .observe import ObservedDrop, observe_drops
+from .runs import Progress, RunStore
+from .scans import BLUR_PROBE, ObservedScan, ScanModel, encode_scan_run, linearise_scan, update_speed
+
+Hypothesis = tuple[str, ...]
+SCAN_MARGIN = 1.06
+SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
+ITERATIONS = 12
+SETTLED = 0.02  # of a standard deviation
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One hypothesis, fitted. values : name of effect -> amplitude (parameter minus null, in the parameter's unit).
+
+    covariance : of (ln p_m, amplitudes in order); evidence : ln of the integrated likelihood (Laplace), priors included.
+    """
+
+    hypothesis: Hypothesis
+    log_p_m: float
+    values: dict[str, float]
+    covariance: FloatArray
+    chi_square: float
+    points: int
+    log_likelihood: float
+    evidence: float
+    linear: Linearised
+    models: list[DropModel]
+    shapes: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Workbench:
+    """A measured campaign with its runs: everything a fit needs."""
+
+    campaign: Campaign
+    drops: list[ObservedDrop]
+    grid: RunGrid
+    families: list[Family]
+    places: dict[str, Place]
+    effects: dict[str, Effect]
+    terms: Terms
+    tables: list[ResponseTable]
+    models: list[DropModel]
+    reasons: dict[str, str]  # why an effect does not apply
+    scans: list[ScanModel] = field(default_factory=list)
+
+    def _fill(self, number: int, index: int, variant: str, name: str = "", amplitude: float = 0.0) -> None:
+        """Encode the runs of one family and enter them into the tables that rest on them."""
+        runs = self.grid.stopped_runs(variant, index, number)
+        if self.families[number].is_scan:
+            pairs = [
+                (table, [encode_scan_run(run, scan.observed, blur) for run in runs or []])
+                for scan in self.scans
+                for table, blur in ((scan.table, 0.0), (scan.blurred, BLUR_PROBE))
+                if self._scan_family(scan) == number
+            ]
+        else:
+            pairs = [(self.tables[number], [encode_run(run) for run in runs or []])]
+        for table, codes in pairs:
+            if name:
+                entry = table.changes.setdefault(name, {}).setdefault(index, {})
+                if runs is not None and index in table.base and amplitude not in entry:
+                    entry[amplitude] = np.array(codes) - table.base[index]
+            elif runs is not None and index not in table.base:
+                table.base[index] = np.array(codes)
+
+    def _scan_family(self, scan: ScanModel) -> int:
+        p = scan.observed.scan.projectile
+        return find_family(self.families, p, is_scan=True)
+
+    def strength_only(self, name: str) -> bool:
+        """Whether an effect changes nothing of a drop but p_m: then the base runs already hold it."""
+        effect = self.effects[name]
+        if effect.change_setting is None or not effect.amplitudes:
+            return False
+        parameter = effect.amplitudes[0]
+        family = self.families[0]
+        setting = self.grid.setting(family, family.speeds[0], 1000.0)
+        place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
+        changed = effect.apply(setting, {parameter.name: parameter.null + parameter.step}, place)
+        back = changed.replace(material=changed.material.replace(p_m=setting.material.p_m))
+        return back == setting
+
+    def at(self, name: str, amplitude: float) -> dict[str, float]:
+        """Values of an effect's parameters at an amplitude, kept inside the limits."""
+        parameter = self.effects[name].amplitudes[0]
+        low, high = parameter.limits
+        return {parameter.name: float(np.clip(parameter.null + amplitude, low, high))}
+
+    def change(self, name: str, amplitude: float) -> Change:
+        effect, values = self.effects[name], self.at(name, amplitude)
+
+        def apply(setting):  # type: ignore[no-untyped-def]
+            return effect.apply(setting, values, self._place(setting.projectile.tip))
+
+        return apply
+
+    def _place(self, tip: str) -> Place:
+        for place in self.places.values():
+            if place.tip == tip:
+                return place
+        return next(iter(self.places.values()))
+
+    def require_base(self, indices: Sequence[int]) -> None:
+        self.grid.require([("", None, index) for index in indices], "nominal model")
+        for number in range(len(self.families)):
+            for index in indices:
+                self._fill(number, index, "")
+
+    def require_changes(self, wanted: Sequence[tuple[str, float, int]], text: str = "") -> None:
+        """Runs of (effect, amplitude, strength index) and what they change."""
+        self.require_base(sorted({index for _, _, index in wanted}))
+        self.grid.require(
+            [(f"{name} {a:.9g}", self.change(name, a), index) for name, a, index in wanted],
+            text or "effects",
+        )
+        for number in range(len(self.families)):
+            for name, amplitude, index in wanted:
+                self._fill(number, index, f"{name} {amplitude:.9g}", name, amplitude)
+
+    def instruments(self, amplitudes: Mapping[str, float]) -> dict[str, Instrument]:
+        made = {}
+        for name, place in self.places.items():
+            instrument = Instrument()
+            for effect_name, amplitude in amplitudes.items():
+                effect = self.effects[effect_name]
+                if effect.change_instrument is not None:
+                    instrument = effect.apply_to_instrument(
+                        instrument, self.at(effect_name, amplitude), place
+                    )
+            made[name] = instrument
+        return made
+
+    def log_offsets(self, amplitudes: Mapping[str, float]) -> dict[str, float]:
+        """Change of ln p_m per drop by effects that act on the strength alone."""
+        offsets = {name: 0.0 for name in self.places}
+        family = self.families[0]
+        setting = self.grid.setting(family, family.speeds[0], 1000.0)
+        for effect_name, amplitude in amplitudes.items():
+            if amplitude != 0.0 and self.strength_only(effect_name):
+                for name, place in self.places.items():
+                    changed = self.effects[effect_name].apply(setting, self.at(effect_name, amplitude), place)
+                    offsets[name] += math.log(changed.material.p_m / setting.material.p_m)
+        return offsets
+
+    def costs_runs(self, name: str) -> bool:
+        return self.effects[name].costs_runs and not self.strength_only(name)
+
+
+def open_workbench(
+    campaign: Campaign,
+    store: RunStore,
+    effects: Mapping[str, Effect],
+    *,
+    terms: Terms | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    cells: int | None = None,
+    drops: list[ObservedDrop] | None = None,
+    scans: Sequence[ObservedScan] = (),
+) -> Workbench:
+    """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
+    drops = drops if drops is not None else observe_drops(campaign)
+    if not drops:
+        raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
+    families: list[Family] = []
+    members: dict[tuple, list[ObservedDrop]] = {}
+    for drop in drops:
+        p = drop.drop.projectile
+        members.setdefault((p.tip, p.tip_radius, round(p.mass, 12)), []).append(drop)
+    tables, models = [], []
+    for group in members.values():
+        speeds = [drop.impact_speed for drop in group]
+        nodes = speed_nodes(min(speeds) / SPEED_MARGIN, max(speeds) * SPEED_MARGIN)
+        projectile = group[0].drop.projectile
+        stated = type(projectile)(projectile.tip, projectile.tip_radius, projectile.mass)
+        families.append(Family(stated, nodes, False))
+        table = ResponseTable(np.log(nodes))
+        tables.append(table)
+        models += [make_drop_model(drop, table) for drop in group]
+    scan_models = []
+    for (tip, radius, mass), group in _group_scans(scans).items():
+        speeds = [scan.scan.speed.value for scan in group]
+        nodes = speed_nodes(min(speeds) / SCAN_MARGIN, max(speeds) * SCAN_MARGIN)
+        families.append(Family(Projectile(tip, radius, mass), nodes, True))
+        for scan in group:
+            start = math.log(scan.scan.speed.value)
+            scan_models.append(
+                ScanModel(scan, ResponseTable(np.log(nodes)), ResponseTable(np.log(nodes)), start)
+            )
+    resolved, reasons = {}, {}
+    for name, effect in effects.items():
+        reason = effect.applies(campaign)
+        if reason:
+            reasons[name] = reason
+        else:
+            resolved[name] = effect.for_campaign(campaign)
+    grid = RunGrid(campaign, store, families, workers=workers, scheduler=scheduler, progress=progress)
+    if cells:
+        grid.cells = cells
+    places = list_places(campaign)
+    return Workbench(
+        campaign,
+        drops,
+        grid,
+        families,
+        places,
+        resolved,
+        terms or Terms(),
+        tables,
+        models,
+        reasons,
+        scan_models,
+    )
+
+
+def _group_scans(scans: Sequence[ObservedScan]) -> dict[tuple, list[ObservedScan]]:
+    groups: dict[tuple, list[ObservedScan]] = {}
+    for scan in scans:
+        p = scan.scan.projectile
+        groups.setdefault((p.tip, p.tip_radius, p.mass), []).append(scan)
+    return groups
+
+
+def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: bool) -> int:
+    """Number of the family with this projectile."""
+    for number, family in enumerate(families):
+        f = family.projectile
+        same = (f.tip, f.tip_radius) == (projectile.tip, projectile.tip_radius)
+        if same and family.is_scan == is_scan and math.isclose(f.mass, projectile.mass, rel_tol=1e-9):
+            return number
+    raise InferenceError("simulation", "projectile", "has no runs")
+
+
+def enclosing_nodes(log_p_m: float) -> list[int]:
+    """The four strength nodes about a value."""
+    below = math.floor((log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
+    return [below - 1, below, below + 1, below + 2]
+
+
+def nearest_nodes(log_p_m: float, share: float = 0.3) -> list[int]:
+    """The nearest strength node, and the next one where the value lies well between two."""
+    place = (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
+    near = round(place)
+    if abs(place - near) <= share:
+        return [near]
+    return [math.floor(place), math.ceil(place)]
+
+
+def fit_hypothesis(
+    bench: Workbench,
+    hypothesis: Hypothesis,
+    start: tuple[float, Mapping[str, float]],
+    *,
+    refine: bool = True,
+    models: list[DropModel] | None = None,
+) -> Fit:
+    """Gauss-Newton from ``start`` = (ln p_m, amplitudes). With refine, runs are made about each new estimate."""
+    models = copy.deepcopy(models if models is not None else bench.models)
+    for model in models:  # tables are shared, only nuisances are the fit's own
+        model.table = bench.tables[_table_number(bench, model)]
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
+    names = ("ln_p_m", *hypothesis)
+    widths = {name: _width(bench, name) for name in hypothesis}
+    linear, covariance, chi, logdet = None, None, 0.0, 0.0
+    asked = 0
+    for iteration in range(ITERATIONS):
+        if refine:
+            asked += _ask(bench, hypothesis, log_p_m, values)
+        linear = linearise_at(bench, models, log_p_m, values)
+        priors = {name: (_prior_distance(bench, name, values[name]), widths[name]) for name in hypothesis}
+        step, covariance, chi, logdet, weighted = solve_globals(linear.blocks, names, priors)
+        moved = _limit(bench, hypothesis, step, values)
+        new_log = float(np.clip(log_p_m + np.clip(moved[0], -0.7, 0.7), low - 0.7, high + 0.7))
+        change = [abs(new_log - log_p_m) / math.sqrt(covariance[0, 0])]
+        log_p_m = new_log
+        for k, name in enumerate(hypothesis):
+            before = values[name]
+            values[name] = _inside(bench, name, before + float(moved[k + 1]))
+            change.append(abs(values[name] - before) / math.sqrt(covariance[k + 1, k + 1]))
+        shift = update_nuisances(models, linear, weighted[0])
+        for scan, block, weights in zip(bench.scans, linear.scans, weighted[1:], strict=True):
+            shift = max(shift, 0.5 * update_speed(scan, block, weights))
+        if max(change) < SETTLED and shift < 0.05 and iteration > 0:
+            break
+    if refine:
+        _ask(bench, hypothesis, log_p_m, values)
+    linear = linearise_at(bench, models, log_p_m, values)
+    priors = {name: (_prior_distance(bench, name, values[name]), widths[name]) for name in hypothesis}
+    _step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, priors)
+    solved_here = _chi_here(linear)
+    n = sum(block.residual.size for block in linear.blocks)
+    log_likelihood = -0.5 * (solved_here + logdet + n * math.log(2 * math.pi))
+    evidence = (
+        log_likelihood + 0.5 * len(names) * math.log(2 * math.pi) + 0.5 * np.linalg.slogdet(covariance)[1]
+    )
+    evidence -= math.log(high - low)
+    for name in hypothesis:
+        parameter = bench.effects[name].amplitudes[0]
+        evidence += float(parameter.log_prior(parameter.null + values[name]))
+    return Fit(
+        hypothesis,
+        log_p_m,
+        values,
+        covariance,
+        solved_here,
+        n,
+        log_likelihood,
+        float(evidence),
+        linear,
+        models,
+    )
+
+
+def _table_number(bench: Workbench, model: DropModel) -> int:
+    return find_family(bench.families, model.observed.drop.projectile, is_scan=False)
+
+
+def with_probes(bench: Workbench, fit: Fit, names: Sequence[str]) -> Linearised:
+    """The linearisation of a fit with tangents of further effects at their null."""
+    return linearise_at(bench, fit.models, fit.log_p_m, fit.values, names)
+
+
+def linearise_at(
+    bench: Workbench,
+    models: list[DropModel],
+    log_p_m: float,
+    values: Mapping[str, float],
+    further: Sequence[str] = (),
+) -> Linearised:
+    probes = {}
+    for name, amplitude in {**{name: 0.0 for name in further}, **values}.items():
+        step = 0.05 * bench.effects[name].amplitudes[0].step
+        parameter = bench.effects[name].amplitudes[0]
+        low, high = parameter.limits
+        if not low <= parameter.null + amplitude + step <= high:
+            step = -step
+        moved = {**values, name: amplitude + step}
+        probes[name] = (moved, bench.instruments(moved), bench.log_offsets(moved), step)
+    instruments, offsets = bench.instruments(values), bench.log_offsets(values)
+    linear = linearise(models, log_p_m, values, instruments, offsets, bench.terms, probes)
+    blocks = []
+    for scan in bench.scans:
+        name = scan.observed.name
+        seen = {probe: (amps, insts[name], step) for probe, (amps, insts, _offsets, step) in probes.items()}
+        blocks.append(linearise_scan(scan, log_p_m, values, instruments[name], bench.terms.scatter, seen))
+    return replace(linear, scans=tuple(blocks))
+
+
+def _chi_here(linear: Linearised) -> float:
+    total = 0.0
+    for block in linear.blocks:
+        lower = np.linalg.cholesky(block.covariance)
+        total += float(np.sum(solve_triangular(lower, block.residual, lower=True) ** 2))
+    return total
+
+
+def amplitude_nodes(bench: Workbench, name: str, amplitude: float) -> list[float]:
+    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits."""
+    parameter = bench.effects[name].amplitudes[0]
+    step, (low, high) = parameter.step, parameter.limits
+    place = amplitude / step
+    if abs(place) <= 1.0:
+        wanted = [1.0 if place >= 0 else -1.0]
+    else:
+        ladder = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
+        sign = math.copysign(1.0, place)
+        above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
+        below = [m for m in ladder if m < abs(place)] or [1.0]
+        wanted = [sign * below[-1], sign * above[0]]
+    nodes = []
+    for m in wanted:
+        value = float(np.clip(parameter.null + m * step, low, high)) - parameter.null
+        if value == 0.0:  # the limit is the null on that side
+            value = step
+        if value not in nodes:
+            nodes.append(value)
+    return nodes
+
+
+def _ask(bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mapping[str, float]) -> int:
+    bench.require_base(enclosing_nodes(log_p_m))
+    wanted = [
+        (name, amplitude, index)
+        for name in hypothesis
+        if bench.costs_runs(name)
+        for amplitude in amplitude_nodes(bench, name, values[name])
+        for index in nearest_nodes(log_p_m)
+    ]
+    if wanted:
+        bench.require_changes(wanted, " and ".join(hypothesis))
+    return len(wanted)
+
+
+def _width(bench: Workbench, name: str) -> float:
+    return bench.effects[name].amplitudes[0].scale
+
+
+def _prior_distance(bench: Workbench, name: str, amplitude: float) -> float:
+    return amplitude
+
+
+def _inside(bench: Workbench, name: str, amplitude: float) -> float:
+    parameter = bench.effects[name].amplitudes[0]
+    low, high = parameter.limits
+    return float(np.clip(parameter.null + amplitude, low, high)) - parameter.null
+
+
+def _limit(
+    bench: Workbench, hypothesis: Hypothesis, step: FloatArray, values: Mapping[str, float]
+) -> FloatArray:
+    """Shorten a step so that no amplitude moves by more than 1.5 of its own simulation steps at once."""
+    factor = min(1.0, 0.7 / max(abs(float(step[0])), 1e-12))
+    for k, name in enumerate(hypothesis):
+        reach = (
+            1.5
+            * abs(bench.effects[name].amplitudes[0].step)
+            * max(1.0, abs(values[name] / bench.effects[name].amplitudes[0].step))
+        )
+        if abs(step[k + 1]) > reach:
+            factor = min(factor, reach / abs(float(step[k + 1])))
+    return step * factor

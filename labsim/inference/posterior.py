@@ -1,0 +1,145 @@
+"""emcee on a campaign's likelihood, stopped when the chain is long enough, stored so that a killed chain goes on.
+
+The likelihood near its maximum is carried by the whitened residual as a quadratic function of the parameters (exact for what
+is linear, measured at the corners), so a step of all walkers costs a matrix product.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import emcee
+import numpy as np
+
+from ..records import FloatArray
+from .runs import Progress
+
+REACH = 2.5  # standard deviations at which the residual is measured
+WALKERS_PER_PARAMETER = 16
+LONG_ENOUGH = 50  # autocorrelation times
+CHECK_EVERY = 500
+LONGEST = 40_000
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """data : arviz.InferenceData, variables ``names`` in the units given to ``transform``."""
+
+    names: tuple[str, ...]
+    data: Any
+    r_hat: float
+    ess: float
+    steps: int
+    autocorrelation: float
+
+    def samples(self, name: str) -> FloatArray:
+        return np.asarray(self.data.posterior[name].values).ravel()
+
+
+@dataclass(frozen=True)
+class QuadraticResidual:
+    """w(θ) = w0 + A u + Σ b_jk u_j u_k with u = (θ - centre)/scale: whitened residuals (n,)."""
+
+    centre: FloatArray
+    scale: FloatArray
+    coefficients: FloatArray  # (terms, n)
+
+    def __call__(self, theta: FloatArray) -> FloatArray:
+        """(m, d) -> (m,) half the squared length of the residual."""
+        terms = _terms((np.atleast_2d(theta) - self.centre) / self.scale)
+        gram = self.coefficients @ self.coefficients.T  # n is large, terms are few
+        return 0.5 * np.einsum("mi,ij,mj->m", terms, gram, terms)
+
+
+def _terms(u: FloatArray) -> FloatArray:
+    d = u.shape[1]
+    columns = [np.ones(len(u)), *u.T]
+    columns += [u[:, j] * u[:, k] for j, k in itertools.combinations_with_replacement(range(d), 2)]
+    return np.stack(columns, axis=1)
+
+
+def measure_residual(
+    residual: Callable[[FloatArray], FloatArray], centre: FloatArray, sigma: FloatArray
+) -> QuadraticResidual:
+    """Quadratic through the centre, both sides of each axis and one corner of each pair."""
+    d = len(centre)
+    u = [np.zeros(d)]
+    for k in range(d):
+        for sign in (-REACH, REACH):
+            point = np.zeros(d)
+            point[k] = sign
+            u.append(point)
+    for j, k in itertools.combinations(range(d), 2):
+        point = np.zeros(d)
+        point[j] = point[k] = REACH / math.sqrt(2)
+        u.append(point)
+    grid = np.array(u)
+    values = np.array([residual(centre + sigma * row) for row in grid])
+    coefficients = np.linalg.lstsq(_terms(grid), values, rcond=None)[0]
+    return QuadraticResidual(centre, sigma, coefficients)
+
+
+def sample(
+    log_probability: Callable[[FloatArray], FloatArray],
+    names: Sequence[str],
+    centre: FloatArray,
+    covariance: FloatArray,
+    *,
+    seed: int,
+    transform: Callable[[str, FloatArray], FloatArray] = lambda name, values: values,
+    backend: Path | None = None,
+    progress: Progress | None = None,
+) -> Posterior:
+    """Run walkers from an over-dispersed start until the chain is LONG_ENOUGH and its times have settled.
+
+    log_probability : (m, d) -> (m,). backend : an HDF5 file; where it holds a shorter chain of the same run it is gone on with.
+    R-hat compares the halves of four groups of walkers: single walkers are not independent chains (emcee, Foreman-Mackey et
+    al. 2013).
+    """
+    d = len(names)
+    walkers = max(32, WALKERS_PER_PARAMETER * d)
+    random = np.random.default_rng(seed)
+    store = emcee.backends.HDFBackend(str(backend)) if backend is not None else None
+    sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True, backend=store)
+    begun = store is not None and store.initialized and store.shape == (walkers, d) and store.iteration > 0
+    if begun:
+        start = None
+    else:
+        if store is not None:
+            store.reset(walkers, d)
+        start = random.multivariate_normal(centre, 4.0 * covariance, size=walkers)
+        sampler.random_state = np.random.RandomState(seed).get_state()
+    old = np.inf
+    tau = np.inf
+    done = sampler.iteration if not begun else store.iteration
+    while done < LONGEST:
+        tau = float(np.max(sampler.get_autocorr_time(tol=0))) if done >= CHECK_EVERY else np.inf
+        if done > LONG_ENOUGH * tau and abs(old - tau) < 0.05 * tau:
+            break
+        old = tau
+        for _ in sampler.sample(start, iterations=CHECK_EVERY):
+            pass
+        start = None
+        done += CHECK_EVERY
+        if progress is not None:
+            progress(done, max(done, 2000), "sampling the posterior")
+    discard = int(5 * tau)
+    chain = sampler.get_chain(discard=discard)  # (steps, walkers, d)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # arviz announces its own rewriting at every import
+        import arviz
+    groups = np.swapaxes(chain, 0, 1)
+    data = arviz.from_dict(
+        posterior={name: transform(name, groups[:, :, k]) for k, name in enumerate(names)},
+        sample_stats={"lp": np.swapaxes(sampler.get_log_prob(discard=discard), 0, 1)},
+    )
+    quarters = groups.reshape(4, -1, d) if walkers % 4 == 0 else groups
+    r_hat = max(float(arviz.rhat(quarters[:, :, k])) for k in range(d))
+    total = chain.shape[0] * walkers
+    return Posterior(tuple(names), data, r_hat, total / tau, int(chain.shape[0]), tau)

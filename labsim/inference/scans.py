@@ -1,0 +1,184 @@
+"""A CT map in the likelihood: simulated dust seen through the scan, in the frame of the undisturbed surface.
+
+Codes of scan runs are (ln D, filling factor on the scan's cells). The dust stays where the stop left it; the bead does not: it
+rebounds by some tens of micrometres before it comes to rest, so where it lies is compared with a generous error (LIFT).
+Nuisances: impact speed (stated, moved to its best value), grey level (GREY), height of the map (SHIFT), sample scatter. Noise:
+the map's own, correlated between neighbouring cells as measured in undisturbed dust, and the solver's error of the compaction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..ct.project import project
+from ..ct.reduce import ReducedScan
+from ..effects import Instrument
+from ..records import FloatArray, Scan
+from ..sph import DropRun
+from .forward import ResponseTable
+
+GREY = 0.005  # relative, of the grey calibration, where nothing is stated
+SHIFT = 10e-6  # m, of the map against its surface
+LIFT = 60e-6  # m, of the bead at rest over its lowest point
+NUMERICAL_SHARE = 0.06  # of φ - φ0: two spacings differ by that beside the tip
+NUMERICAL_FLOOR = 0.0015
+CORRELATION = 0.25  # length of the solver's error, tip radii
+
+
+@dataclass(frozen=True)
+class ObservedScan:
+    """Cells of a map that are compared: filling_factor, sigma : (n,); row, column : (n,) int; r, z : (n,) m."""
+
+    scan: Scan
+    reduced: ReducedScan
+    cells: np.ndarray  # (nz, nr) bool
+    filling_factor: FloatArray
+    sigma: FloatArray
+    undisturbed: float
+
+    @property
+    def name(self) -> str:
+        return self.scan.name
+
+    @property
+    def radius(self) -> float:
+        return self.scan.projectile.tip_radius
+
+
+def observe_scan(reduced: ReducedScan) -> ObservedScan:
+    """Choose the cells: within three tip radii of the axis, from two below the tip to just under the surface."""
+    found, radius = reduced.map, reduced.scan.projectile.tip_radius
+    r, z = np.meshgrid(found.r, found.z)
+    finite = np.isfinite(found.filling_factor) & np.isfinite(found.sigma) & ~reduced.masked
+    inside = (r < 3 * radius) & (z < -0.25 * radius) & (z > -found.tip_depth - 2 * radius)
+    # the hole above the bead is air and its wall is not modelled well
+    above = (r < 1.4 * radius) & (z > -found.tip_depth + 1.2 * radius)
+    cells = finite & inside & ~above
+    return ObservedScan(
+        reduced.scan,
+        reduced,
+        cells,
+        found.filling_factor[cells],
+        np.maximum(found.sigma[cells], 1e-4),
+        float(reduced.undisturbed.value),
+    )
+
+
+def encode_scan_run(run: DropRun, observed: ObservedScan, blur: float = 0.0) -> FloatArray:
+    """(1 + n,): ln D and the filling factor on the compared cells. blur: m, beside the scan's own, in quadrature."""
+    dust, reduced = run.particles, observed.reduced
+    seen = project(
+        dust.r,
+        dust.z,
+        dust.volume,
+        dust.filling_factor,
+        reduced.map,
+        blur=math.hypot(reduced.blur, blur),
+        masked=~observed.cells,
+    )
+    return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
+
+
+@dataclass(frozen=True)
+class Block:
+    """One independent part of the data about one point. residual : (n,); covariance : (n, n); tangents : name -> (n,)."""
+
+    residual: FloatArray
+    covariance: FloatArray
+    tangents: dict[str, FloatArray]
+    free: FloatArray  # (n,), size of the contrast that an unknown cause may change
+    by_speed: FloatArray | None = (
+        None  # (n,), change with the impact speed, per its stated standard uncertainty
+    )
+
+
+@dataclass
+class ScanModel:
+    observed: ObservedScan
+    table: ResponseTable
+    blurred: ResponseTable  # the same runs with BLUR_PROBE more blur, for the tangent of the blur
+    log_speed: float  # ln of the impact speed, moved to its best value by each fit
+
+
+BLUR_PROBE = 3.0e-5  # m
+
+
+def linearise_scan(
+    model: ScanModel,
+    log_p_m: float,
+    amplitudes: Mapping[str, float],
+    instrument: Instrument,
+    scatter: float,
+    probes: Mapping[str, tuple[Mapping[str, float], Instrument, float]],
+) -> Block:
+    """Residual, covariance and tangents of one scan; probes: name -> (amplitudes, instrument, step)."""
+    observed = model.observed
+    log_speed = model.log_speed
+    found = observed.reduced.map
+
+    def predict(lp: float, ls: float, amps: Mapping[str, float], inst: Instrument) -> FloatArray:
+        code = model.table.code(lp, ls, amps)
+        cells = code[1:]
+        if inst.ct_blur > 0:
+            wide = model.blurred.code(lp, ls, amps)[1:]
+            cells = cells + (wide - cells) * (inst.ct_blur / BLUR_PROBE) ** 2  # blur adds variances
+        return np.concatenate([cells * inst.ct_scale, [math.exp(code[0])]])
+
+    here = predict(log_p_m, log_speed, amplitudes, instrument)
+    data = np.concatenate([observed.filling_factor, [found.tip_depth]])
+    n = data.size - 1
+    rows, columns = np.nonzero(observed.cells)
+    errors = observed.reduced.errors
+    near_r = np.clip(errors.correlation_r, 0.0, 0.95)
+    near_z = np.clip(errors.correlation_z, 0.0, 0.95)
+    apart_r, apart_z = np.abs(np.subtract.outer(columns, columns)), np.abs(np.subtract.outer(rows, rows))
+    noise = np.outer(observed.sigma, observed.sigma) * near_r**apart_r * near_z**apart_z
+    covariance = np.zeros((n + 1, n + 1))
+    covariance[:n, :n] = noise
+    cell = float(np.mean(np.diff(found.r)))
+    distance2 = (apart_r**2 + apart_z**2) * (cell / (CORRELATION * observed.radius)) ** 2
+    contrast = np.abs(here[:n] - observed.undisturbed)
+    error = NUMERICAL_SHARE * contrast + NUMERICAL_FLOOR
+    covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2)
+    covariance[n, n] = LIFT**2
+    speed = observed.scan.speed
+    nuisances = [
+        (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here)
+        / 0.02
+        * (speed.sigma / speed.value),
+        (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02 * scatter,
+        np.append(here[:n] * GREY, 0.0),
+        np.append(_slope_along_z(observed, here[:n]) * SHIFT, 0.0),
+    ]
+    spread = speed.sigma / speed.value
+    pull = (log_speed - math.log(speed.value)) / spread
+    for column in nuisances:
+        covariance += np.outer(column, column)
+    covariance[np.diag_indices(n + 1)] += 1e-12
+    tangents = {"ln_p_m": (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02}
+    for name, (amps, inst, step) in probes.items():
+        tangents[name] = (predict(log_p_m, log_speed, amps, inst) - here) / step
+    residual = data - here + nuisances[0] * pull  # the speed is zero-mean about what is stated
+    return Block(residual, covariance, tangents, np.append(contrast, 0.0), nuisances[0])
+
+
+def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:
+    full = np.full(observed.cells.shape, np.nan)
+    full[observed.cells] = cells
+    slope = np.gradient(full, observed.reduced.map.z, axis=0)
+    return np.nan_to_num(slope[observed.cells])
+
+
+def update_speed(model: ScanModel, block: Block, weighted: FloatArray) -> float:
+    """Move the impact speed of a scan to its conditional best value; return the move in stated uncertainties."""
+    speed = model.observed.scan.speed
+    assert block.by_speed is not None
+    best = float(np.clip(block.by_speed @ weighted, -3.0, 3.0))
+    moved = math.log(speed.value) + best * speed.sigma / speed.value
+    change = abs(moved - model.log_speed) * speed.value / speed.sigma
+    model.log_speed = moved
+    return change
