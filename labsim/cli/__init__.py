@@ -21,6 +21,7 @@ from .. import __version__
 from ..errors import LabsimError
 
 NOT_COMMANDS = {"options"}
+STOPPED = 130  # what shells say of a command that was interrupted
 
 
 def list_command_files() -> list[str]:
@@ -92,7 +93,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         path = context.command_path if context is not None else "labsim"
         status = _complain(f"{path}: {trouble.format_message()}", 2)
     except (KeyboardInterrupt, typer.Abort):
-        status = _complain("stopped; start the same command again to go on from the stored runs", 130)
+        status = STOPPED
+    if status == STOPPED:
+        _complain("stopped; start the same command again to go on from the stored runs", STOPPED)
     sys.exit(status if isinstance(status, int) else 0)
 
 

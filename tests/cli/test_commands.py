@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import meshio
@@ -178,3 +181,21 @@ def test_a_new_campaign_needs_only_its_records(tmp_path: Path, capsys: pytest.Ca
     assert call("check", str(folder)) == 0
     assert call("new", str(folder)) == 2
     assert "not empty" in capsys.readouterr().err
+
+
+def test_ctrl_c_stops_at_once_with_one_line(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "labsim", "calibrate", str(SEED), "-o", str(tmp_path / "out")]
+    process = subprocess.Popen(
+        [*command, "--store", str(tmp_path / "store"), "--workers", "2"],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        cwd=SEED.parents[1],
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith("calibration runs")
+    time.sleep(2.0)
+    os.killpg(process.pid, signal.SIGINT)
+    rest = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert any(line.startswith("error: stopped") for line in rest.splitlines())
