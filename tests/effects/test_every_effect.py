@@ -72,7 +72,9 @@ def make_setting(name: str = "", **changes: object) -> DropSetting:
         impact_speed=0.5,
         material=CAMPAIGN.material,
         gravity=0.0 if name == "gravity" else 9.81,
-        spacing=SPACING,
+        spacing=RADIUS / 5.6
+        if name == "resolution"
+        else SPACING,  # 1.4 times as coarse is the solver's limit
         width=4 * RADIUS,
         depth=5 * RADIUS,
         duration=4.0e-3,
@@ -194,7 +196,7 @@ def predict_at_random(name: str, rng: np.random.Generator, **changes: object) ->
 @pytest.mark.parametrize("name", EFFECTS)
 def test_random_values_give_finite_predictions(name: str) -> None:
     rng = np.random.default_rng(3)
-    for _ in range(2):
+    for _ in range(1 if name == "resolution" else 2):  # fine spacings are slow
         predict_at_random(name, rng)
 
 
@@ -204,7 +206,7 @@ def test_many_random_values_at_several_speeds(name: str) -> None:
     seed = datetime.date.today().toordinal()
     print(f"seed {seed}")
     rng = np.random.default_rng([seed, *name.encode()])
-    for _ in range(20):
+    for _ in range(4 if name == "resolution" else 20):
         predict_at_random(name, rng, impact_speed=float(rng.uniform(0.12, 1.2)), depth=None, duration=8e-3)
 
 
@@ -214,7 +216,7 @@ def test_the_stated_direction_holds(name: str) -> None:
     values = in_steps(name, 1.0, base)
     before, after = observe(name, effect.at(), base), observe(name, values, base)
     if name == "planar_geometry":
-        before = observe("resolution", EFFECTS["resolution"].at(), base)
+        before = observe("projectile_mass", EFFECTS["projectile_mass"].at(), base)
     grows = 1.0
     if values:
         parameter = effect.amplitudes[0]
