@@ -36,35 +36,33 @@ def fit_cupping(stack: SliceStack, axis: tuple[float, float], bead: Bead, surfac
     if stack.count - start < 4:
         return Cupping()
     deep = np.zeros((ny, nx))
-    square = np.zeros((ny, nx))
     rows = range(start, stack.count, max(1, (stack.count - start) // 40))
     for k in rows:
-        image = stack.slice(k).astype(float)
-        deep += image
-        square += image**2
+        deep += stack.slice(k)
     deep /= len(rows)
     y, x = np.mgrid[:ny, :nx]
     rho = np.hypot(x - (nx - 1) / 2, y - (ny - 1) / 2) / (min(nx, ny) / 2)
     inside = rho < 1
-    noise = float(np.sqrt(np.median(square / len(rows) - deep**2) / len(rows)))
-    design = np.column_stack([np.ones(inside.sum()), rho[inside] ** 2, rho[inside] ** 4])
-    values = deep[inside]
+    # ring by ring, so that the scatter of the rings themselves, not only voxel noise, says how sure a cup is
+    bins = (rho[inside] * min(nx, ny) / 4).astype(int)
+    count = np.bincount(bins)
+    profile = np.bincount(bins, deep[inside]) / np.maximum(count, 1)
+    at = np.bincount(bins, rho[inside]) / np.maximum(count, 1)
+    weight = np.sqrt(count)
     best = None
     for terms in (2, 3):
-        a = design[:, :terms]
-        solution = np.linalg.lstsq(a, values, rcond=None)[0]
-        chi2 = float(((values - a @ solution) ** 2).sum()) / max(noise, 1e-9) ** 2
-        if best is None or chi2 < best[2] - 25:
-            covariance = np.linalg.inv(a.T @ a) * max(noise, 1e-9) ** 2
-            end = np.array([0.0, 1.0, 1.0])[:terms]
-            best = (solution, float(np.sqrt(end @ covariance @ end)), chi2)
-    solution, sigma, _ = best
+        a = np.column_stack([np.ones_like(at), at**2, at**4])[:, :terms]
+        solution = np.linalg.lstsq(a * weight[:, None], profile * weight, rcond=None)[0]
+        residual = profile - a @ solution
+        chi2 = float((count * residual**2).sum()) / (len(at) - terms)
+        end = np.array([0.0, 1.0, 1.0])[:terms]
+        covariance = np.linalg.inv((a * count[:, None]).T @ a) * chi2
+        if best is None or chi2 < 0.7 * best[2]:
+            best = (solution, float(np.sqrt(end @ covariance @ end)), chi2, float(np.std(residual)))
+    solution, sigma, _, left_over = best
     amount = float(solution[1:].sum())
     full = sum(c * np.minimum(rho, 1.2) ** p for c, p in zip(solution[1:], (2, 4), strict=False))
     full = full - full[inside].mean()
-    bins = (rho[inside] * 30).astype(int)
-    profile = np.bincount(bins, values - solution[0] - (full[inside] + 0)) / np.maximum(np.bincount(bins), 1)
-    left_over = float(np.std(profile))
     followed = abs(amount) > 4 * sigma and abs(amount) > 0.003 * (surface.dust - surface.air)
     return Cupping(amount, sigma, left_over, followed, full.astype(np.float32) if followed else 0.0)
 

@@ -75,12 +75,17 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
             f"the bead's radius is {radius:.2f} voxels, radius_mm / voxel_um gives {stated:.2f}; correct one of them",
         )
     warnings = []
-    # half of the bead's own level cannot be seen where it is clipped: the radius reads up to 4 % small there
-    if abs(radius / stated - 1) > (0.05 if saturated else 0.03):
+    if (
+        abs(radius / stated - 1) > 0.03 and not saturated
+    ):  # where the half level is clipped the radius reads large
         warnings.append(
             f"the bead's radius is {radius:.2f} voxels but {stated:.2f} are stated: voxel size or radius is off"
         )
     tree = cKDTree(directions)
+    if (
+        saturated
+    ):  # the half level may be cut off; the whole edge, clipped as it was recorded, still tells the centre
+        fit = _fit_clipped_edge(box, fit, stated, level, top, directions, outside, tree)
     lateral, axial = (
         _fit_blur(box, fit, radius, level, top, directions, outside, tree, region)
         for region in ("lateral", "axial")
@@ -175,7 +180,10 @@ def _edge_points(
         len(directions), -1
     )
     outside = grey[:, along > radius + 2.5].mean(1)
-    half = np.minimum(0.5 * (outside + level), 0.95 * top)[:, None]
+    # the same share of every ray's step, or the saturated bead would be drawn to where its surroundings are brightest
+    room = (0.95 * top - outside) / np.maximum(level - outside, 1e-9)
+    share = min(0.5, float(np.percentile(room, 5)))
+    half = np.minimum(outside + share * (level - outside), 0.97 * top)[:, None]
     below = grey < half
     at = np.argmax(below, axis=1)
     used = below.any(1) & (at > 0)
@@ -204,6 +212,38 @@ def _fit_sphere(points: FloatArray) -> tuple[FloatArray, float, float]:
         rms = float(np.sqrt(np.mean(residual[keep] ** 2)))
         keep = np.abs(residual) < max(4 * rms, 0.3)
     return centre, radius, rms
+
+
+def _fit_clipped_edge(
+    box: FloatArray, start: FloatArray, radius: float, level: float, top: float,
+    directions: FloatArray, outside: FloatArray, tree: cKDTree,
+) -> FloatArray:  # fmt: skip
+    """Centre of a saturated bead of known radius: least squares of the clipped, blurred step over the edge's voxels."""
+    index = (
+        np.stack(np.meshgrid(*(np.arange(n) for n in box.shape), indexing="ij"), -1)
+        .reshape(-1, 3)
+        .astype(float)
+    )
+    offset = index - start
+    distance = np.linalg.norm(offset, axis=1)
+    near = np.abs(distance - radius) < 3.5
+    direction = offset[near] / distance[near, None]
+    if len(directions) and directions[:, 2].min() > 0:
+        lower = direction[:, 2] > 0.1
+        near[np.flatnonzero(near)[~lower]] = False
+        direction = direction[lower]
+    background = outside[tree.query(direction)[1]]
+    points, grey = index[near], box.reshape(-1)[near]
+
+    def misfit(q: FloatArray) -> FloatArray:
+        d = np.linalg.norm(points - q[:3], axis=1)
+        share = 0.5 * erfc((d - radius) / (np.sqrt(2) * q[3]))
+        return np.minimum(background + (q[4] * level - background) * share, top) - grey
+
+    first = np.append(start, [0.7, 1.0])
+    span = np.array([1.5, 1.5, 1.5])
+    bounds = (np.append(start - span, [0.1, 0.4]), np.append(start + span, [4.0, 2.0]))
+    return least_squares(misfit, first, bounds=bounds, loss="soft_l1", f_scale=0.05 * top).x[:3]
 
 
 def _fit_blur(

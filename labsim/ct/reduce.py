@@ -105,7 +105,7 @@ def reduce_scan(
     report(2, 4, "azimuthal mean")
     ny, nx = stack.shape
     reach = min(x, y, nx - 1 - x, ny - 1 - y) + 0.5
-    cupping, ring_rms, corrections = Cupping(), 0.0, None
+    cupping, ring_rms = Cupping(), 0.0
     hidden = _bead_mask(stack, scan, bead, guard)
     if correct:
         cupping = fit_cupping(stack, (x, y), bead, surface)

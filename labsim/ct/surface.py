@@ -73,8 +73,9 @@ def find_surface(
     first = int(crossings[0])
     air_rows, dust_rows = mean[: max(1, first - 3)], mean[first + 5 :]
     air, dust = float(np.mean(air_rows)), float(np.median(dust_rows))
-    # a second, sharper crossing with the levels of the whole stack, not of its ends
-    row = _cross(mean, 0.5 * (air + dust), first)
+    # half of the step that is there: a crust's own level, not the bulk's, lies below the surface
+    below_surface = float(mean[first + 3 : first + 7].mean())
+    row = _cross(mean, 0.5 * (air + below_surface), first)
     gx = 0.5 * (rows[2] + rows[3] - rows[0] - rows[1])
     gy = 0.5 * (rows[1] + rows[3] - rows[0] - rows[2])
     arm = 2 * np.mean(np.abs(x - axis[0])[far])

@@ -14,7 +14,7 @@ from matplotlib.patches import Circle
 
 from ..records import CompressedVolume, FillingMap, FloatArray
 
-LEVELS = np.arange(0.0, 0.3251, 0.025)
+LEVELS = np.arange(-0.0125, 0.3876, 0.025)  # no edge at 0.15, where the noise of undisturbed dust would flicker
 
 
 def draw_map(scan_map: FillingMap, undisturbed: float, path: Path, title: str = "") -> Path:
@@ -24,13 +24,13 @@ def draw_map(scan_map: FillingMap, undisturbed: float, path: Path, title: str = 
     r, z, phi = _mirror(scan_map, scan_map.filling_factor)
     lines = axes[0].contour(r, z, phi, [0.16, 0.20, 0.25], colors="k", linewidths=[0.5, 1.4, 1.0])
     axes[0].clabel(lines, fmt="%.2f", fontsize=8)
-    figure.colorbar(image, ax=axes[0], label="filling factor")
+    figure.colorbar(image, ax=axes[0], label="filling factor", ticks=np.arange(0, 0.376, 0.05))
     axes[0].set_title(
         f"{title}  undisturbed {undisturbed:.4f}, tip {scan_map.tip_depth * 1e3:.3f} mm deep".strip()
     )
     top = np.nanpercentile(scan_map.sigma, 99)
     image = _show(axes[1], scan_map, scan_map.sigma, np.linspace(0, top, 21), "magma")
-    figure.colorbar(image, ax=axes[1], label="standard error of a cell")
+    figure.colorbar(image, ax=axes[1], label="standard error of a cell", format="%.4f")
     axes[1].set_title("random error (the calibration's scale not included)")
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -44,7 +44,6 @@ def draw_compressed(curve: CompressedVolume, path: Path, title: str = "") -> Pat
     axis.fill_between(curve.filling_factor, np.maximum(volume - sigma, 1e-5), volume + sigma, alpha=0.3, lw=0)
     axis.plot(curve.filling_factor, np.where(volume > 0, volume, np.nan))
     axis.axvline(0.2, color="0.5", lw=0.8, ls="--")
-    axis.text(0.201, axis.get_ylim()[1], " counted as compacted", fontsize=8, color="0.4", va="top")
     axis.set(yscale="log", ylim=(1e-3, max(3.0, 2 * float(np.max(volume[curve.filling_factor > 0.155])))))
     axis.set(
         xlim=(0.14, 0.35),
@@ -52,6 +51,7 @@ def draw_compressed(curve: CompressedVolume, path: Path, title: str = "") -> Pat
         ylabel="volume denser than φ / sphere volume",
         title=title,
     )
+    axis.text(0.201, axis.get_ylim()[1] * 0.85, " counted as compacted", fontsize=8, color="0.4", va="top")
     axis.grid(alpha=0.3)
     figure.savefig(path, dpi=110)
     plt.close(figure)
