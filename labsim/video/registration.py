@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.ndimage import spline_filter
 
 from ..records import FloatArray
@@ -46,8 +47,8 @@ class Template:
 
     def shifted(self, dy: float, dx: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """m, ∂m/∂dy and ∂m/∂dx on the inner region for the template moved by (dy, dx), each |shift| < 1."""
-        wy, gy = _spline_weights(dy)
-        wx, gx = _spline_weights(dx)
+        wy, gy = _spline_weights(float(dy))
+        wx, gx = _spline_weights(float(dx))
         c, (h, w) = self.coefficients, self.shape
         first = MARGIN - 2  # five taps from two before to two after the pixel
         along = sum(wy[k] * c[first + k : first + k + h] for k in range(5))
@@ -58,13 +59,21 @@ class Template:
         return m, my, mx
 
 
+@njit(cache=True)
 def _spline_weights(shift: float) -> tuple[FloatArray, FloatArray]:
     """Cubic B-spline at the five nodes around a pixel of a picture moved by ``shift``, and its derivative by shift."""
-    u = -shift - np.arange(-2, 3)
-    a = np.abs(u)
-    value = np.where(a < 1, 2.0 / 3.0 - a**2 + 0.5 * a**3, np.where(a < 2, (2 - a) ** 3 / 6.0, 0.0))
-    slope = np.sign(u) * np.where(a < 1, -2 * a + 1.5 * a**2, np.where(a < 2, -0.5 * (2 - a) ** 2, 0.0))
-    return value, -slope
+    value, slope = np.empty(5), np.empty(5)
+    for k in range(5):
+        u = 2.0 - k - shift
+        a = abs(u)
+        sign = 1.0 if u > 0 else -1.0
+        if a < 1:
+            value[k], slope[k] = 2.0 / 3.0 - a**2 + 0.5 * a**3, -sign * (1.5 * a**2 - 2 * a)
+        elif a < 2:
+            value[k], slope[k] = (2 - a) ** 3 / 6.0, sign * 0.5 * (2 - a) ** 2
+        else:
+            value[k], slope[k] = 0.0, 0.0
+    return value, slope
 
 
 def register(
@@ -87,8 +96,6 @@ def register(
     """
     h, w = template.shape
     theta = np.array([0.0, 0.0, brightness, level, 0.0, 0.0])
-    across = np.linspace(-1.0, 1.0, w)[None, :]
-    down = np.linspace(-1.0, 1.0, h)[:, None]
     oy, ox = round(y), round(x)
     dy, dx = y - oy, x - ox
     region = None
@@ -106,33 +113,22 @@ def register(
             if region is None:
                 return None
             image, ground, mask, rows, columns = region
-        m, my, mx = (part[rows, columns] for part in template.shifted(dy, dx))
-        a, b = theta[2], theta[3]
-        plane = theta[4] * down[rows] + theta[5] * across[:, columns]
-        model = a * ground * (1 - m) + b * m
-        residual = (image - model - plane) * mask
-        weight = mask / noise.variance(model)
-        full = weight
-        if robust:
-            # the model's own sampling error at steep edges must not look like spray
-            size = np.abs(residual) * np.sqrt(weight)
-            huber = np.where(size > HUBER, HUBER / np.maximum(size, 1e-9), 1.0)
-            weight = weight * huber
-        lever = b - a * ground
-        by_y = lever * my
-        slopes = np.stack(
-            [
-                by_y,
-                lever * mx,
-                ground * (1 - m),
-                m,
-                np.broadcast_to(down[rows], m.shape),
-                np.broadcast_to(across[:, columns], m.shape),
-            ]
-        ).reshape(6, -1)
-        weighted = slopes * weight.ravel()
-        fisher = weighted @ slopes.T
-        right = weighted @ residual.ravel()
+        fisher, right, sums = _accumulate(
+            template.coefficients,
+            *_spline_weights(float(dy)),
+            *_spline_weights(float(dx)),
+            rows.start,
+            columns.start,
+            h,
+            w,
+            image,
+            ground,
+            mask,
+            theta,
+            noise.read_variance,
+            noise.gain,
+            HUBER if robust else 1e9,
+        )
         scale = np.sqrt(np.diag(fisher)) + 1e-12
         try:
             step = np.linalg.solve(fisher / np.outer(scale, scale) + 1e-9 * np.eye(6), right / scale) / scale
@@ -143,10 +139,8 @@ def register(
             step[:2] *= 2.0 / jump
         dy, dx = dy + step[0], dx + step[1]
         theta[2:] += step[2:]
-        pixels = mask.sum()
-        chi_square = float(np.sum(weight * residual**2) / max(pixels - 6, 1))
-        sensitive = full * by_y**2
-        lost = 1.0 - float(np.sum(weight * by_y**2) / max(np.sum(sensitive), 1e-30))
+        chi_square = sums[0] / max(sums[3] - 6, 1)
+        lost = 1.0 - sums[1] / max(sums[2], 1e-30)
         if jump < ENOUGH:
             break
     else:
@@ -166,6 +160,56 @@ def register(
     )
 
 
+@njit(cache=True)
+def _accumulate(  # type: ignore[no-untyped-def]
+    c, wy, gy, wx, gx, row0, column0, h, w, image, ground, mask, theta, read_variance, gain, huber
+):  # pragma: no cover - compiled
+    """Normal equations of one Gauss-Newton step: Fisher matrix (6, 6), right side (6,), and (χ², information kept,
+    information at hand, pixels). One pass over the pixels; the template's spline is evaluated on the way."""
+    fisher, right, sums, slope = np.zeros((6, 6)), np.zeros(6), np.zeros(4), np.zeros(6)
+    along, steep = np.empty(image.shape[1] + 4), np.empty(image.shape[1] + 4)
+    for i in range(image.shape[0]):
+        down = 2.0 * (row0 + i) / (h - 1) - 1.0
+        for j in range(image.shape[1] + 4):
+            value = tilt = 0.0
+            for k in range(5):
+                coefficient = c[row0 + i + k + 1, column0 + j + 1]
+                value += wy[k] * coefficient
+                tilt += gy[k] * coefficient
+            along[j], steep[j] = value, tilt
+        for j in range(image.shape[1]):
+            if mask[i, j] == 0.0:
+                continue
+            m = my = mx = 0.0
+            for k in range(5):
+                m += wx[k] * along[j + k]
+                mx += gx[k] * along[j + k]
+                my += wx[k] * steep[j + k]
+            across = 2.0 * (column0 + j) / (w - 1) - 1.0
+            model = theta[2] * ground[i, j] * (1.0 - m) + theta[3] * m
+            residual = image[i, j] - model - theta[4] * down - theta[5] * across
+            weight = 1.0 / max(read_variance + gain * max(model, 0.0), 1.0 / 12.0)
+            full = weight
+            size = abs(residual) * np.sqrt(weight)
+            if size > huber:
+                weight *= huber / size
+            lever = theta[3] - theta[2] * ground[i, j]
+            slope[0], slope[1], slope[2] = lever * my, lever * mx, ground[i, j] * (1.0 - m)
+            slope[3], slope[4], slope[5] = m, down, across
+            for p in range(6):
+                right[p] += weight * slope[p] * residual
+                for q in range(p, 6):
+                    fisher[p, q] += weight * slope[p] * slope[q]
+            sums[0] += weight * residual**2
+            sums[1] += weight * slope[0] ** 2
+            sums[2] += full * slope[0] ** 2
+            sums[3] += 1.0
+    for p in range(6):
+        for q in range(p):
+            fisher[p, q] = fisher[q, p]
+    return fisher, right, sums
+
+
 def _cut(picture, background, usable, top, left, h, w):  # type: ignore[no-untyped-def]
     """The part of the region inside the picture, with the slices of the template that belong to it."""
     rows = slice(max(0, -top), min(h, picture.shape[0] - top))
@@ -176,7 +220,13 @@ def _cut(picture, background, usable, top, left, h, w):  # type: ignore[no-untyp
     mask = usable[here].astype(np.float64)
     if mask.sum() < 40:
         return None
-    return picture[here].astype(np.float64), background[here], mask, rows, columns
+    return (
+        picture[here].astype(np.float64),
+        np.ascontiguousarray(background[here], np.float64),
+        mask,
+        rows,
+        columns,
+    )
 
 
 def sample_opacity(
