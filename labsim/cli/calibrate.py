@@ -13,6 +13,7 @@ from ..inference.planar import READINGS
 from ..inference.runs import RunStore
 from ..inference.summary import SummaryCalibration, calibrate_summary
 from . import options
+from .measured import calibrate_measured, has_tracks
 
 Use = Annotated[
     str,
@@ -37,6 +38,12 @@ def calibrate(
     use: Use = "depth",
     planar_correction: Correction = None,
     bulk_modulus: BulkModulus = None,
+    parameters: Annotated[
+        str,
+        typer.Option(
+            "--parameters", help="p_m and names of effects to fit with it, with commas (tracks only)."
+        ),
+    ] = "p_m",
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
     store: options.Store = None,
@@ -47,6 +54,14 @@ def calibrate(
     """Find p_m from a campaign: posterior.nc, calibration.json, corner.png, fit.png."""
     read = read_campaign(campaign)
     figures = parse_use(use)
+    if has_tracks(read):
+        folder = options.make_output_folder(out, campaign, "calibrate")
+        names = tuple(name.strip() for name in parameters.split(",") if name.strip() not in ("", "p_m"))
+        with options.show_progress(quiet) as progress:
+            settings = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
+            summary, lines = calibrate_measured(read, folder, RunStore(store), names, settings)
+        options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
+        return
     check_summary(read)
     folder = options.make_output_folder(out, campaign, "calibrate")
     with options.show_progress(quiet) as progress:

@@ -13,6 +13,7 @@ from ..effects import Model, write_model
 from ..inference.runs import RunStore
 from ..inference.summary import calibrate_summary
 from . import options
+from .measured import diagnose_measured, has_tracks
 from .calibrate import (
     BulkModulus,
     Correction,
@@ -40,6 +41,13 @@ def diagnose(
     """Calibrate, predict what was not calibrated, and say what the simulation gets wrong."""
     read = read_campaign(campaign)
     figures = parse_use(use)
+    if has_tracks(read):
+        folder = options.make_output_folder(out, campaign, "diagnose")
+        with options.show_progress(quiet) as progress:
+            settings = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
+            summary, lines = diagnose_measured(read, folder, RunStore(store), settings)
+        options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
+        return
     check_summary(read)
     folder = options.make_output_folder(out, campaign, "diagnose")
     opened = RunStore(store)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..inference.calibrate import estimate_scatter, prepare, sample_fit
+from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
 from ..inference.fitting import Fit, Hypothesis, Workbench, fit_hypothesis
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
@@ -59,7 +59,7 @@ def diagnose_campaign(
     scheduler: str | None = None,
     seed: int = 1,
     progress: Progress | None = None,
-    use_scans: bool = True,
+    use_scans: bool = False,
     cells: int | None = None,
 ) -> Diagnosis:
     """Measure, calibrate, screen, confirm, judge. Raises LabsimError subclasses as its parts do."""
@@ -95,6 +95,7 @@ def diagnose_campaign(
     held_best = predict_held_out(bench, best)
     scatter = estimate_scatter(bench, nominal)
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
+    warnings += warn_unused_scans(campaign, bench)
     low, high = campaign.p_m_range
     if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
         warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")

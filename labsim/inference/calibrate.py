@@ -53,7 +53,7 @@ def prepare(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
-    use_scans: bool = True,
+    use_scans: bool = False,
     cells: int | None = None,
 ) -> tuple[Workbench, Fit]:
     """Measure the campaign, fit the nominal model, estimate the scatter between samples and fit again."""
@@ -87,7 +87,7 @@ def calibrate(
     seed: int = 1,
     progress: Progress | None = None,
     backend: Path | None = None,
-    use_scans: bool = True,
+    use_scans: bool = False,
 ) -> Calibration:
     """Posterior of p_m (Pa) and of effects named in ``parameters`` ("shear_strength" or "shear_strength.factor").
 
@@ -108,7 +108,7 @@ def calibrate(
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = float(chi2.sf(fit.chi_square, max(fit.points - 1 - len(names) - _free(bench), 1)))
-    warnings = []
+    warnings = warn_unused_scans(campaign, bench)
     if p_value < 0.05:
         warnings.append(f"the model does not explain the data (p = {p_value:.2g}); labsim diagnose asks why")
     return Calibration(
@@ -124,6 +124,14 @@ def calibrate(
         time.perf_counter() - began,
         tuple(warnings),
     )
+
+
+def warn_unused_scans(campaign: Campaign, bench: Workbench) -> list[str]:
+    """One line where scans exist that the likelihood did not use."""
+    if campaign.scans and not bench.scans:
+        names = ", ".join(scan.name for scan in campaign.scans)
+        return [f"scans {names} are not part of the likelihood; labsim ct reduces them"]
+    return []
 
 
 def _free(bench: Workbench) -> int:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MeasurementError
-from ..records import Campaign, Drop, FloatArray, Sample, Track
+from ..records import Campaign, Drop, FloatArray, Track
 from ..video.track_file import deviate_from_neighbours, read_track
 
 STANDARD_GRAVITY = 9.81  # m/s^2, of every free fall, whatever the nominal model holds
@@ -118,9 +118,9 @@ def read_observed_track(drop: Drop) -> Track:
     assert drop.camera is not None and drop.record.path is not None
     if drop.record.kind == "track":
         return read_track(drop.record.path, drop.camera, drop.record.row_sigma)
-    from ..video import track_drop_video  # the readers of pixels are only needed here
+    from ..video import open_frames, track_projectile  # the readers of pixels are only needed here
 
-    return track_drop_video(drop)
+    return track_projectile(open_frames(drop.record.path), frame_rate=drop.camera.frame_rate)
 
 
 def observe_drops(campaign: Campaign) -> list[ObservedDrop]:
@@ -130,7 +130,3 @@ def observe_drops(campaign: Campaign) -> list[ObservedDrop]:
         for drop in campaign.drops
         if drop.record.kind != "summary"
     ]
-
-
-def sample_of(campaign: Campaign) -> Sample:
-    return campaign.sample

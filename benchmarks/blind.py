@@ -1,0 +1,133 @@
+"""Diagnose a folder of labelled campaigns and compare with what was hidden in them.
+
+    python benchmarks/blind.py FOLDER [--only p03,p05] [--out TABLE.md] [--workers 2]
+
+FOLDER holds campaigns and ``truth.json`` (cause, p_m, note per campaign). Prints top-1, class, false alarms, wrong
+names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaign's folder only; truth is opened afterwards.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import subprocess
+import time
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from labsim.campaign import read_campaign
+from labsim.diagnosis.campaign import CONFUSABLE, Diagnosis, diagnose_campaign
+from labsim.inference.runs import RunStore
+
+
+def describe(name: str, found: Diagnosis) -> dict:
+    """What the diagnosis says, before the truth is known."""
+    p_m = found.posterior_extended.samples("p_m_Pa")
+    nominal = found.posterior_nominal.samples("p_m_Pa")
+    return {
+        "campaign": name,
+        "verdict": found.verdict.word,
+        "first": " + ".join(found.verdict.probabilities[0][0]),
+        "probability": found.verdict.probabilities[0][1],
+        "ranked": [(" + ".join(h), p) for h, p in found.verdict.probabilities],
+        "p_value": found.p_value,
+        "p_m": float(np.median(p_m)),
+        "p_m_90": tuple(np.quantile(p_m, [0.05, 0.95])),
+        "p_m_nominal": float(np.median(nominal)),
+        "gain": found.gain.fraction_removed,
+        "confusable": found.confusable,
+        "runs_new": found.runs_new,
+        "wall": found.wall,
+    }
+
+
+def score(rows: list[dict], truth: dict) -> pd.DataFrame:
+    """Set the answers beside the truth."""
+    table = []
+    for row in rows:
+        known = truth[row["campaign"]]
+        cause = known["cause"]
+        alike = {cause}
+        for first, second, cosine in row["confusable"]:
+            if cause in (first, second) and abs(cosine) > CONFUSABLE:
+                alike |= {first, second}
+        probabilities = dict(row["ranked"])
+        low, high = row["p_m_90"]
+        table.append(
+            {
+                "campaign": row["campaign"],
+                "hidden": cause,
+                "first": row["first"],
+                "P": round(row["probability"], 3),
+                "P(hidden)": round(probabilities.get(cause, 0.0), 3),
+                "rank": 1 + [h for h, _ in row["ranked"]].index(cause) if cause in probabilities else 0,
+                "exact": row["first"] == cause,
+                "class": row["first"] in alike and len(alike) <= 3,
+                "wrong>0.5": row["first"] not in alike
+                and row["first"] not in ("none", "unknown")
+                and row["probability"] > 0.5,
+                "Brier": round(sum((p - (h == cause)) ** 2 for h, p in row["ranked"]), 3),
+                "p_m true": known["pm"],
+                "p_m": round(row["p_m"]),
+                "p_m nominal": round(row["p_m_nominal"]),
+                "in 90 %": low <= known["pm"] <= high,
+                "gain": round(row["gain"], 2),
+                "new runs": row["runs_new"],
+                "s": round(row["wall"]),
+            }
+        )
+    return pd.DataFrame(table)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--workers", type=int, default=None)
+    parser.add_argument("--store", type=Path, default=None)
+    options = parser.parse_args()
+    only = {name for name in options.only.split(",") if name}
+    names = sorted(path.parent.name for path in options.folder.glob("*/campaign.toml"))
+    rows = []
+    for name in names:
+        if only and name not in only:
+            continue
+        began = time.perf_counter()
+        found = diagnose_campaign(
+            read_campaign(options.folder / name), RunStore(options.store), workers=options.workers
+        )
+        rows.append(describe(name, found))
+        top = ", ".join(f"{h} {p:.3f}" for h, p in rows[-1]["ranked"][:3])
+        print(f"{name}: {top}  ({time.perf_counter() - began:.0f} s)", flush=True)
+    table = score(rows, json.loads((options.folder / "truth.json").read_text()))
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
+    ).stdout.strip()
+    nulls, others = table[table.hidden == "none"], table[~table.hidden.isin(["none", "unknown"])]
+    lines = [
+        f"{date.today()}, commit {commit}: {len(table)} campaigns",
+        f"none called none {int((nulls['first'] == 'none').sum())} of {len(nulls)}; exact cause first "
+        f"{int(others.exact.sum())} of {len(others)}, class {int(others['class'].sum())} of {len(others)}; wrong cause with "
+        f"P > 0.5 {int(table['wrong>0.5'].sum())} of {len(table)}; mean Brier {table.Brier.mean():.3f}; p_m in its 90 % "
+        f"interval {int(table['in 90 %'].sum())} of {len(table)}; median gain {others.gain.median() if len(others) else math.nan:.2f}",
+    ]
+    text = "\n".join(lines)
+    print(table.to_string(index=False))
+    print(text)
+    if options.out:
+        header = "| " + " | ".join(table.columns) + " |\n|" + "---|" * len(table.columns) + "\n"
+        body = "\n".join(
+            "| " + " | ".join(str(value) for value in row) + " |" for row in table.itertuples(index=False)
+        )
+        options.out.write_text(f"{text}\n\n{header}{body}\n")
+
+
+if __name__ == "__main__":
+    main()

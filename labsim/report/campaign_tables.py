@@ -1,0 +1,199 @@
+"""calibration.json and diagnosis.json of a campaign with tracks and scans, and the lines that people read."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..diagnosis.campaign import Diagnosis
+from ..diagnosis.next_experiment import Suggestion
+from ..effects.model import Model
+from ..inference.calibrate import Calibration
+from ..inference.grid import DEFAULT_CELLS
+from ..inference.posterior import Posterior
+from ..inference.summary import summarise
+from ..sph import solver_hash
+
+NUMERICAL_DEPTH = (
+    0.0043  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
+)
+
+
+def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
+    """calibration.json."""
+    others = [name for name in found.posterior.names if name != "p_m_Pa"]
+    return {
+        "campaign": found.campaign.name,
+        "p_m_Pa": summarise(found.posterior.samples("p_m_Pa")),
+        "parameters": {name: summarise(found.posterior.samples(name)) for name in others},
+        "r_hat": found.posterior.r_hat,
+        "ess": found.posterior.ess,
+        "chi_square": found.fit.chi_square,
+        "points": found.fit.points,
+        "p_value": found.p_value,
+        "sample_scatter_ln_p_m": {"mean": found.scatter, "sd": found.scatter_sigma},
+        "runs_new": found.runs_new,
+        "runs_reused": found.runs_reused,
+        "wall_s": found.wall,
+        "solver": solver_hash(),
+        "warnings": list(found.warnings),
+    }
+
+
+def campaign_calibration_lines(found: Calibration) -> str:
+    p_m = summarise(found.posterior.samples("p_m_Pa"))
+    lines = [
+        f"{found.campaign.name}: p_m = {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa "
+        f"(90 %: {p_m['q05'] / 1e3:.3f} to {p_m['q95'] / 1e3:.3f} kPa)",
+    ]
+    for name in found.posterior.names[1:]:
+        q = summarise(found.posterior.samples(name))
+        lines.append(f"  {name} = {q['mean']:.4g} ± {q['sd']:.2g}")
+    lines += [
+        f"  {len(found.bench.models)} drops, {len(found.bench.scans)} scans; χ² {found.fit.chi_square:.0f} for "
+        f"{found.fit.points} data (p = {found.p_value:.2g})",
+        f"  scatter of ln p_m from sample to sample {found.scatter:.3f} ± {found.scatter_sigma:.3f}",
+        f"  R-hat {found.posterior.r_hat:.3f}, {found.posterior.ess:.0f} independent samples; "
+        f"{found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s",
+    ]
+    return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings)])
+
+
+def _quantiles(posterior: Posterior, name: str) -> dict[str, float]:
+    q05, q50, q95 = np.quantile(posterior.samples(name), [0.05, 0.5, 0.95])
+    return {"q05": float(q05), "q50": float(q50), "q95": float(q95)}
+
+
+def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) -> dict[str, Any]:
+    """diagnosis.json, with the contract's keys."""
+    fits = {fit.hypothesis: fit for fit in found.rivals}
+    causes = []
+    for hypothesis, probability in found.verdict.probabilities:
+        parameters: dict[str, Any] = {}
+        fit = fits.get(hypothesis)
+        if fit is not None:
+            for k, name in enumerate(hypothesis, start=1):
+                parameter = found.bench.effects[name].amplitudes[0]
+                value, sigma = parameter.null + fit.values[name], math.sqrt(fit.covariance[k, k])
+                full = f"{name}.{parameter.name}"
+                low, high = parameter.limits
+                if fit is found.best and full in found.posterior_extended.names:
+                    entry = _quantiles(found.posterior_extended, full)
+                else:
+                    entry = {
+                        "q05": float(np.clip(value - 1.645 * sigma, low, high)),
+                        "q50": value,
+                        "q95": float(np.clip(value + 1.645 * sigma, low, high)),
+                    }
+                parameters[full] = {**entry, "unit": parameter.unit}
+        causes.append({"causes": list(hypothesis), "probability": probability, "parameters": parameters})
+    gain = found.gain
+    return {
+        "format": 1,
+        "campaign": found.campaign.name,
+        "verdict": found.verdict.word,
+        "p_value": found.p_value,
+        "causes": causes,
+        "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
+        "p_m_Pa": {
+            "nominal": summarise(found.posterior_nominal.samples("p_m_Pa")),
+            "extended": summarise(found.posterior_extended.samples("p_m_Pa")),
+        },
+        "gain": {
+            "rms_nominal_m": gain.rms_nominal,
+            "rms_extended_m": gain.rms_extended,
+            "rms_noise_m": gain.rms_noise,
+            "log_score_difference": gain.log_score_difference,
+            "log_score_difference_sigma": gain.log_score_difference_sigma,
+            "fraction_of_discrepancy_removed": gain.fraction_removed,
+            "extension": list(found.best.hypothesis),
+            "drops": [
+                {"name": name, "rms_nominal_m": float(a), "rms_extended_m": float(b)}
+                for name, a, b in zip(
+                    found.held_out_nominal.names,
+                    found.held_out_nominal.rms,
+                    found.held_out_extended.rms,
+                    strict=True,
+                )
+            ],
+        },
+        "next_experiment": [
+            {"change": each.change, "information_bits": each.information_bits} for each in suggestions
+        ],
+        "numerical_error": {
+            "depth_relative": NUMERICAL_DEPTH,
+            "spacing_m": min(family.projectile.tip_radius for family in found.bench.families) / DEFAULT_CELLS,
+        },
+        "sample_scatter_ln_p_m": {"mean": found.scatter[0], "sd": found.scatter[1]},
+        "runs_new": found.runs_new,
+        "runs_reused": found.runs_reused,
+        "wall_s": found.wall,
+        "solver": solver_hash(),
+        "warnings": list(found.warnings),
+    }
+
+
+def say_verdict(found: Diagnosis) -> str:
+    """The verdict as one sentence that a laboratory can act on."""
+    best, probability = found.verdict.probabilities[0]
+    p_m = math.exp(found.best.log_p_m) / 1e3
+    if found.verdict.word == "none":
+        nominal = math.exp(found.nominal.log_p_m) / 1e3
+        return (
+            f"The nominal simulation explains these data at p_m = {nominal:.2f} kPa "
+            f"(probability {probability:.2f}); nothing in the catalogue is needed."
+        )
+    if found.verdict.word == "unknown":
+        return (
+            f"The simulation is wrong in a way that no listed cause explains (probability {probability:.2f}): "
+            f"what is missing looks like a law of {found.unknown.block}, about {100 * found.unknown.size:.0f} % of the depth."
+        )
+    parts = []
+    for name in best:
+        effect = found.bench.effects[name]
+        parameter = effect.amplitudes[0]
+        value = parameter.null + found.best.values.get(name, 0.0)
+        parts.append(
+            f"{effect.title[0].lower() + effect.title[1:]} ({name}: {parameter.name} = {value:.3g} {parameter.unit})"
+        )
+    return (
+        f"The simulation is wrong because {' and '.join(parts)}, with probability {probability:.2f}; with it p_m is "
+        f"{p_m:.2f} kPa instead of {math.exp(found.nominal.log_p_m) / 1e3:.2f} kPa, and on held-out drops "
+        f"{100 * found.gain.fraction_removed:.0f} % of the removable discrepancy is gone."
+    )
+
+
+def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
+    lines = [say_verdict(found), ""]
+    lines.append("  probability  cause")
+    for hypothesis, probability in found.verdict.probabilities[:6]:
+        lines.append(f"  {probability:11.3f}  {' + '.join(hypothesis)}")
+    gain = found.gain
+    lines.append(
+        f"  held-out drops: rms {gain.rms_nominal * 1e6:.1f} µm nominal, {gain.rms_extended * 1e6:.1f} µm with "
+        f"{' + '.join(found.best.hypothesis) or 'nothing added'}, {gain.rms_noise * 1e6:.1f} µm expected; ln score "
+        f"{gain.log_score_difference:+.1f} ± {gain.log_score_difference_sigma:.1f}"
+    )
+    lines.append(
+        f"  nominal model: p = {found.p_value:.2g}; scatter between samples {found.scatter[0]:.3f} of ln p_m"
+    )
+    for first, second, cosine in found.confusable[:4]:
+        lines.append(f"  hard to tell apart here: {first} and {second} (cosine {cosine:+.2f})")
+    if suggestions:
+        lines.append(
+            f"  next experiment: {suggestions[0].change} ({suggestions[0].information_bits:.2f} bits)"
+        )
+    lines.append(f"  {found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s")
+    return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings)])
+
+
+def extended_model(found: Diagnosis) -> Model:
+    """The extension as model.toml holds it."""
+    effects = tuple(
+        (name, found.bench.effects[name].at(found.bench.at(name, found.best.values[name])))
+        for name in (found.best.hypothesis if found.verdict.word == "effect" else ())
+    )
+    fit = found.best if found.verdict.word == "effect" else found.nominal
+    return Model(p_m=math.exp(fit.log_p_m), effects=effects)
