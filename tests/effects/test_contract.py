@@ -179,12 +179,12 @@ def test_nulls_are_the_campaigns_own() -> None:
     assert nulls["hard_floor.depth"] == 0.012
 
 
-@pytest.mark.parametrize("phi", [0.13, 0.15, 0.25, 0.4])
-@pytest.mark.parametrize("phi_2", [0.33, 0.58, 0.70])
+DUSTS = [(phi, phi_2) for phi in (0.13, 0.15, 0.25, 0.4) for phi_2 in (0.33, 0.58, 0.70) if phi < phi_2]
+
+
+@pytest.mark.parametrize(("phi", "phi_2"), DUSTS)
 def test_the_catalogue_fits_other_laboratories(phi: float, phi_2: float) -> None:
     """Limits, steps and priors hold for dust near either end of its law, for small and for large tips."""
-    if phi >= phi_2:
-        pytest.skip("no such dust")
     usual = reference_campaign()
     for scale in (0.2, 1.0, 5.0):
         drops = tuple(
