@@ -60,11 +60,13 @@ def describe(summary: dict, target: Path) -> str:
     sphere = summary["normalisation"]["sphere_volume_m3"]
     sigma = summary["compacted_volume_sigma_m3"]
     ledger = summary["mass_ledger_m3"]
+    lean = [1e3 * t for t in summary["tilt_rad"]]
+    phi, phi_sigma = summary["filling_factor_undisturbed"], summary["filling_factor_undisturbed_sigma"]
     lines = [
-        f"axis at pixel ({x:.2f}, {y:.2f}), leaning {1e3 * summary['tilt_rad'][0]:+.1f}, {1e3 * summary['tilt_rad'][1]:+.1f} mrad "
+        f"axis at pixel ({x:.2f}, {y:.2f}), leaning {lean[0]:+.1f}, {lean[1]:+.1f} mrad "
         f"(± {1e3 * summary['tilt_sigma_rad']:.1f})",
         f"tip {summary['tip_depth_m'] * 1e3:.3f} mm below the undisturbed surface",
-        f"undisturbed filling factor {summary['filling_factor_undisturbed']:.5f} ± {summary['filling_factor_undisturbed_sigma']:.5f}",
+        f"undisturbed filling factor {phi:.5f} ± {phi_sigma:.5f}",
         f"denser than 0.20: {summary['compacted_volume_m3'] * 1e9:.3f} ± {sigma * 1e9:.3f} mm³ = "
         f"{summary['compacted_volume_sphere_volumes']:.2f} ± {sigma / sphere:.2f} sphere volumes",
         f"voxel noise {summary['voxel_noise']:.4f}, point spread {summary['blur_m'] * 1e6:.0f} µm",

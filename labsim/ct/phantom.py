@@ -17,7 +17,8 @@ class Phantom:
     """What a phantom is made of. Lengths in voxels where not said otherwise; ``centre`` is the bead's (x, y, k).
 
     zone : filling factor added at the bead's lowest point; it falls off as a Gaussian of width zone_width bead radii.
-    noise, ring, cup : in filling factor (one voxel; one ring's standard deviation, one radius in seven has one; rim minus middle). tilt : rad about
+    noise, ring, cup : in filling factor (one voxel; one ring's standard deviation, one radius in
+    seven has one; rim minus middle). tilt : rad about
     which the zone leans towards x. surface : slice number of the free surface.
     """
 

@@ -118,7 +118,7 @@ def reconstruct_cone(
         raise MeasurementError(
             "reconstruct_cone", "astra", "is not installed; run: pip install astra-toolbox, or export slices"
         ) from None
-    count, rows, columns = attenuation.shape
+    _, rows, columns = attenuation.shape
     magnified = (source_to_axis + axis_to_camera) / source_to_axis
     voxel = pixel / magnified
     scale = 1 / voxel  # ASTRA's volume has unit voxels

@@ -338,7 +338,8 @@ def _grey_warnings(
         warnings.append("the bead is saturated: its own density cannot be read")
     if abs(grey.filling_factor_air) > 0.003:
         warnings.append(
-            f"air reads a filling factor of {grey.filling_factor_air:+.4f}; grey_air is {grey.grey_air_stated:g}, measured {grey.grey_air:.2f}"
+            f"air reads a filling factor of {grey.filling_factor_air:+.4f}; "
+            f"grey_air is {grey.grey_air_stated:g}, measured {grey.grey_air:.2f}"
         )
     if np.isfinite(grey.scale_air_dust) and abs(grey.scale_air_dust - 1) > 0.03:
         warnings.append(

@@ -14,7 +14,9 @@ from matplotlib.patches import Circle
 
 from ..records import CompressedVolume, FillingMap, FloatArray
 
-LEVELS = np.arange(-0.0125, 0.3876, 0.025)  # no edge at 0.15, where the noise of undisturbed dust would flicker
+LEVELS = np.arange(
+    -0.0125, 0.3876, 0.025
+)  # no edge at 0.15, where the noise of undisturbed dust would flicker
 
 
 def draw_map(scan_map: FillingMap, undisturbed: float, path: Path, title: str = "") -> Path:
