@@ -71,7 +71,7 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
     assert published is not None
     with new_figure(path) as figure:
         axes = figure.add_subplot()
-        colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.88, 5))
+        colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.78, 5))
         for run, colour in zip(runs[first : first + 5], colours, strict=True):
             upto = run.time <= 1.12 * run.stopping_time
             axes.plot(
@@ -81,6 +81,14 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
                 label=f"{run.setting.material.p_m / 1e3:.2f} kPa",
             )
             axes.plot(run.stopping_time * 1e3, run.penetration_depth * 1e3, "o", color=colour, ms=5)
+            axes.annotate(
+                f"{run.setting.material.p_m / 1e3:.2f} kPa",
+                (run.stopping_time * 1e3, run.penetration_depth * 1e3),
+                xytext=(6, -14),
+                textcoords="offset points",
+                ha="center",
+                color=colour,
+            )
         axes.set(xlabel="time since contact (ms)", ylabel="raw planar depth (mm)", xlim=(0, None))
         bottom = 1.12 * axes.get_ylim()[1]
         axes.set_ylim(bottom, 0.0)
@@ -100,9 +108,8 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
         setting = runs[middle].setting
         axes.set_title(
             f"{2e3 * setting.projectile.tip_radius:g} mm cylinder at {setting.impact_speed:g} m/s, "
-            f"K0 {calibration.bulk_modulus / 1e3:g} kPa; dots: v = 0"
+            f"K0 {calibration.bulk_modulus / 1e3:g} kPa; at each stop its p_m"
         )
-        axes.legend(title="p_m", loc="upper right", bbox_to_anchor=(0.84, 1.0))
     return path
 
 
