@@ -155,7 +155,10 @@ def balance_mass(scan_map: FillingMap, undisturbed: float) -> MassLedger:
     heaped = float(np.where(above, phi * volumes, 0.0).sum() / undisturbed)
     r, h = scan_map.bead_radius, min(scan_map.tip_depth, 2 * scan_map.bead_radius)
     cap = np.pi * h * h * (3 * r - h) / 3
-    spread = float(np.sqrt(np.nansum((np.where(below, sigma, 0.0) * volumes / undisturbed) ** 2)))
+    unseen = below & ~np.isfinite(scan_map.filling_factor)
+    random = np.nansum((np.where(below, sigma, 0.0) * volumes / undisturbed) ** 2)
+    # the extrapolated dust may be off by a third of its excess, all of it in the same direction
+    spread = float(np.sqrt(random + (np.abs(excess[unseen]).sum() / 3) ** 2))
     return MassLedger(cap + float(crater), float(net + crater), heaped, spread)
 
 

@@ -239,3 +239,15 @@ def test_linearised_beam_hardening():
 
 def test_absorb():
     assert absorb(np.array([30.0]), np.array([110.0]), np.array([10.0]))[0] == pytest.approx(np.log(5))
+
+
+def test_cone_beam_needs_astra():
+    from labsim.ct.reconstruct import reconstruct_cone
+
+    try:
+        import astra  # noqa: F401
+    except ImportError:
+        with pytest.raises(MeasurementError, match="pip install astra-toolbox"):
+            reconstruct_cone(np.zeros((4, 5, 6)), np.zeros(4), 1e-4, 0.1, 0.1)
+    else:
+        pytest.skip("ASTRA is installed; its FDK needs a GPU that this test does not ask for")
