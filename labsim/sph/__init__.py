@@ -1,8 +1,19 @@
 """The bundled SPH solver: a drop setting in, depth against time and the filling factor out. SI throughout."""
 
 from ._jit import solver_hash
+from .convergence import ConvergedRun, simulate_spacings
 from .drop import simulate
 from .run import DropRun, Particles
 from .setting import DropSetting, Numerics, check_setting
 
-__all__ = ["DropRun", "DropSetting", "Numerics", "Particles", "check_setting", "simulate", "solver_hash"]
+__all__ = [
+    "ConvergedRun",
+    "DropRun",
+    "DropSetting",
+    "Numerics",
+    "Particles",
+    "check_setting",
+    "simulate",
+    "simulate_spacings",
+    "solver_hash",
+]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..records import FloatArray, Material, Projectile
+from . import particles as rows
 from .drop import STEPS_AT_ONCE, Evolution, evolve
 from .particles import fill_at_rest
 from .setting import DropSetting, Numerics
@@ -72,3 +73,20 @@ def evolve_body(
         wall = np.zeros(state.shape[1], dtype=bool)
     nowhere = np.array([1.0e9, -1.0e-30, 0.0, 0.0, 0.0])
     return evolve(setting, state, wall, nowhere, watch, steps_at_once, planes)
+
+
+def place_rings(spacing: float, duration: float, speed: float = 0.059) -> tuple[DropSetting, FloatArray]:
+    """Two elastic rings (radii 3 and 4, centres at ±5) flying at each other, in units of density and bulk modulus 1.
+
+    Swegle (1995), Monaghan (2000): each moves at ``speed`` in units of the sound speed, μ = 0.22 K.
+    """
+    material = elastic_material(1.0, 0.22)
+    setting = set_body(material, spacing, duration, filling_factor=0.15, monomer_density=1 / 0.15)
+    half = np.arange(-int(4 / spacing) - 1, int(4 / spacing) + 1) + 0.5
+    x, z = np.meshgrid(half * spacing, half * spacing)
+    ring = (np.hypot(x, z) > 3) & (np.hypot(x, z) < 4)
+    x, z = x[ring], z[ring]
+    both = np.concatenate([x - 5, x + 5])
+    state = fill_at_rest(setting, both, np.tile(z, 2), np.full(both.size, setting.filling_factor))
+    state[rows.U] = -np.sign(both) * speed
+    return setting, state
