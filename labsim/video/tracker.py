@@ -175,7 +175,9 @@ def follow_projectile(
             frames.path, "video", f"only {int(valid.sum())} frames can be tracked ({common})"
         )
     where = surface_row if surface_row is not None else surface.value if surface is not None else None
-    level = None if scene.surface is None else float(np.arctan(-scene.surface[1]))
+    level = (
+        None if scene.surface is None or scene.surface_sigma > 0.5 else float(np.arctan(-scene.surface[1]))
+    )
     row, rotation = _straighten(row, x, valid, tip_radius or 0.0, where, level, warnings)
     rejected = int(np.sum(~valid))
     if rejected:
