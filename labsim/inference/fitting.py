@@ -303,14 +303,12 @@ def fit_hypothesis(
     log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
     names = ("ln_p_m", *hypothesis)
     widths = {name: _width(bench, name) for name in hypothesis}
-    linear, covariance, chi, logdet = None, None, 0.0, 0.0
-    asked = 0
     for iteration in range(ITERATIONS):
         if refine:
-            asked += _ask(bench, hypothesis, log_p_m, values)
+            _ask(bench, hypothesis, log_p_m, values)
         linear = linearise_at(bench, models, log_p_m, values)
         priors = {name: (_prior_distance(bench, name, values[name]), widths[name]) for name in hypothesis}
-        step, covariance, chi, logdet, weighted = solve_globals(linear.blocks, names, priors)
+        step, covariance, _chi, _logdet, weighted = solve_globals(linear.blocks, names, priors)
         moved = _limit(bench, hypothesis, step, values)
         new_log = float(np.clip(log_p_m + np.clip(moved[0], -0.7, 0.7), low - 0.7, high + 0.7))
         change = [abs(new_log - log_p_m) / math.sqrt(covariance[0, 0])]

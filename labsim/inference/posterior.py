@@ -109,7 +109,8 @@ def sample(
     sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True, backend=store)
     begun = store is not None and store.initialized and store.shape == (walkers, d) and store.iteration > 0
     if begun:
-        start = None
+        assert store is not None
+        start = store.get_last_sample()
     else:
         if store is not None:
             store.reset(walkers, d)
@@ -117,15 +118,13 @@ def sample(
         sampler.random_state = np.random.RandomState(seed).get_state()
     old = np.inf
     tau = np.inf
-    done = sampler.iteration if not begun else store.iteration
+    done = store.iteration if store is not None and begun else 0
     while done < LONGEST:
         tau = float(np.max(sampler.get_autocorr_time(tol=0))) if done >= CHECK_EVERY else np.inf
         if done > LONG_ENOUGH * tau and abs(old - tau) < 0.05 * tau:
             break
         old = tau
-        for _ in sampler.sample(start, iterations=CHECK_EVERY):
-            pass
-        start = None
+        start = sampler.run_mcmc(start, CHECK_EVERY)
         done += CHECK_EVERY
         if progress is not None:
             progress(done, max(done, 2000), "sampling the posterior")

@@ -1,0 +1,168 @@
+"""Codes of curves, nodes, free fall, the linear algebra and the sampler, each against an answer known otherwise."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labsim.inference.curves import FRACTIONS, CodePolynomial, decode_depth, decode_rate, encode_run
+from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
+from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
+from labsim.inference.likelihood import solve_globals
+from labsim.inference.observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
+from labsim.inference.posterior import measure_residual, sample
+from labsim.inference.scans import Block
+from labsim.records import Camera, Drop, Material, Measured, Projectile, Record, Track
+from labsim.sph import DropSetting, simulate
+
+
+def sine_code(depth=1e-3, stop=2e-3):
+    shape = np.sin(0.5 * math.pi * np.minimum(FRACTIONS, 1.0))
+    return np.concatenate([[math.log(depth), math.log(stop)], shape])
+
+
+def test_polynomial_is_exact_for_cubics():
+    nodes = np.array([-1.0, 0.0, 0.7, 2.0])
+    cubic = CodePolynomial(nodes, np.stack([nodes**3 - nodes, 2 * nodes**2], axis=1))
+    assert cubic(1.3) == pytest.approx([1.3**3 - 1.3, 2 * 1.3**2], rel=1e-12)
+    assert np.isnan(cubic.leave_one_out()[[0, -1]]).all()
+
+
+def test_weights_sum_to_one_and_reproduce_polynomials():
+    nodes = np.log([0.1, 0.17, 0.289, 0.4913])
+    weights = interpolation_weights(nodes, math.log(0.2))
+    assert weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert weights @ nodes**3 == pytest.approx(math.log(0.2) ** 3, rel=1e-12)
+
+
+def test_speed_nodes_enclose_and_are_shared():
+    nodes = speed_nodes(0.14, 1.18)
+    assert nodes[0] <= 0.14 and nodes[-1] >= 1.18
+    assert set(speed_nodes(0.3, 0.31)) <= set(speed_nodes(0.1, 1.0))
+    assert len(speed_nodes(0.3, 0.31)) == 3
+    assert strength_node(1) == 2000.0
+
+
+def test_a_run_comes_back_from_its_code():
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.3, Material(), spacing=5e-4 / 4)
+    run = simulate(setting)
+    code = encode_run(run)
+    time = np.linspace(0, run.stopping_time, 60)
+    assert decode_depth(code, time) == pytest.approx(run.depth_at(time), abs=2e-3 * run.penetration_depth)
+    speed = decode_rate(code, time[5:-5])
+    assert speed == pytest.approx(
+        np.interp(time[5:-5], run.time, run.velocity), abs=0.02 * setting.impact_speed
+    )
+
+
+def test_prediction_is_continuous_at_contact_and_scales_with_the_instrument():
+    code, instant = sine_code(), Instant(5e-3, math.log(0.785), 0.0)
+    time = np.array([5e-3 - 1e-9, 5e-3 + 1e-9])
+    assert (
+        abs(np.diff(predict_depth(code, time, instant, 1.0, 1.0, 0.0))[0]) < 2.1e-9 * 0.785
+    )  # 2 ns of motion
+    grid = np.linspace(0, 7e-3, 50)
+    plain = predict_depth(code, grid, instant, 1.0, 1.0, 0.0)
+    assert predict_depth(code, grid, instant, 1.25, 1.0, 0.0) == pytest.approx(plain / 1.25, rel=1e-12)
+    assert predict_depth(code, grid * 0.8, instant, 1.0, 0.8, 0.0) == pytest.approx(
+        plain, rel=1e-9, abs=1e-12
+    )
+    step = 1e-7
+    later = predict_depth(code, grid, replace(instant, contact_time=5e-3 + step), 1.0, 1.0, 0.0)
+    speed = predict_speed(code, grid, instant, 1.0, 1.0)
+    inside = np.abs(grid - 5e-3) > 1e-5
+    assert ((plain - later) / step)[inside] == pytest.approx(speed[inside], rel=1e-3, abs=1e-4)
+
+
+def test_effects_add_a_polynomial_that_vanishes_at_null():
+    speeds = np.log([0.2, 0.3, 0.4])
+    base = np.stack([sine_code(stop=2e-3 + k * 1e-4) for k in range(3)])
+    table = ResponseTable(speeds, {0: base, 1: base - 0.2})
+    table.changes["e"] = {0: {1.0: 0.1 * np.ones_like(base), 2.0: 0.4 * np.ones_like(base)}}
+    plain = table.code(math.log(1200.0), speeds[1], {})
+    assert table.code(math.log(1200.0), speeds[1], {"e": 0.0}) == pytest.approx(plain, abs=0)
+    # 0.1 a² goes through (0, 0), (1, 0.1), (2, 0.4)
+    assert table.code(math.log(1200.0), speeds[1], {"e": 1.5}) - plain == pytest.approx(0.225, rel=1e-12)
+
+
+def make_drop(height=20e-3):
+    camera = Camera(frame_rate=10000.0, pixel_size=20e-6, surface_row=300.0, surface_row_sigma=0.15)
+    projectile = Projectile("hemisphere", 5e-4, 1.33e-6)
+    return Drop("D01", projectile, 1, Measured(height, 1e-4), camera, Record("track", None, 0.08))
+
+
+def synthetic_track(drop, rng, outliers=()):
+    camera = drop.camera
+    code, contact, speed = sine_code(), 0.0081, 0.785
+    time = np.arange(110) / camera.frame_rate
+    depth = predict_depth(code, time, Instant(contact, math.log(speed), 0.0), 1.0, 1.0, 0.0)
+    row = camera.surface_row + depth / camera.pixel_size + 0.08 * rng.standard_normal(time.size)
+    for k in outliers:
+        row[k] += 4.0
+    n = time.size
+    return Track(np.arange(n), time, row, np.full(n, 0.08), np.ones(n, bool), ("",) * n)
+
+
+def test_free_fall_gives_contact_and_speed_and_outliers_go():
+    drop = make_drop()
+    track = synthetic_track(drop, np.random.default_rng(3), outliers=(20, 21, 60))
+    observed = observe_drop(drop, track, 0.0)
+    assert not set(observed.time) & set(track.time[[20, 21, 60]])
+    assert observed.rejected <= 3 + 5  # good frames beside an outlier may go with it
+    assert observed.contact_time == pytest.approx(0.0081, abs=1e-5)
+    assert observed.impact_speed == pytest.approx(0.785, rel=2e-3)
+    assert observed.time.max() < 0.0081 + 2.6e-3  # what follows the stop is left out
+
+
+def test_places_in_the_sequence():
+    drops = tuple(replace(make_drop(), name=f"D{k}", sequence=s) for k, s in enumerate((3, 1, 2)))
+    assert sequence_fractions(drops) == {"D0": 0.5, "D1": -0.5, "D2": 0.0}
+
+
+def test_globals_are_generalised_least_squares():
+    rng = np.random.default_rng(5)
+    root = rng.standard_normal((30, 30))
+    covariance = root @ root.T + np.eye(30)
+    tangent, residual = rng.standard_normal(30), rng.standard_normal(30)
+    blocks = [
+        Block(residual[part], covariance[part, part], {"ln_p_m": tangent[part]}, residual[part] * 0)
+        for part in (slice(0, 18), slice(18, 30))
+    ]
+    step, spread, chi, logdet, _ = solve_globals(blocks, ["ln_p_m"], {})
+    full = np.zeros((30, 30))
+    full[:18, :18], full[18:, 18:] = covariance[:18, :18], covariance[18:, 18:]
+    inverse = np.linalg.inv(full)
+    expected = tangent @ inverse @ residual / (tangent @ inverse @ tangent)
+    assert step[0] == pytest.approx(expected, rel=1e-9)
+    assert spread[0, 0] == pytest.approx(1 / (tangent @ inverse @ tangent), rel=1e-9)
+    assert logdet == pytest.approx(np.linalg.slogdet(full)[1], rel=1e-9)
+    left = residual - tangent * expected
+    assert chi == pytest.approx(left @ inverse @ left, rel=1e-9)
+
+
+def test_sampler_recovers_a_known_gaussian_and_goes_on_after_a_stop(tmp_path):
+    mean, covariance = np.array([0.3, -1.0]), np.array([[0.04, 0.01], [0.01, 0.09]])
+    lower = np.linalg.cholesky(covariance)
+    quadratic = measure_residual(
+        lambda theta: np.linalg.solve(lower, theta - mean), mean, np.sqrt(np.diag(covariance))
+    )
+    found = sample(
+        lambda theta: -quadratic(theta), ["a", "b"], mean, covariance, seed=2, backend=tmp_path / "chain.h5"
+    )
+    error = 1 / math.sqrt(found.ess)
+    for k, name in enumerate(("a", "b")):
+        sigma = math.sqrt(covariance[k, k])
+        assert found.samples(name).mean() == pytest.approx(mean[k], abs=5 * error * sigma)
+        assert found.samples(name).std() == pytest.approx(sigma, rel=5 * error)
+    assert found.r_hat < 1.05
+    again = sample(
+        lambda theta: -quadratic(theta), ["a", "b"], mean, covariance, seed=2, backend=tmp_path / "chain.h5"
+    )
+    assert again.steps >= found.steps
+
+
+def test_free_fall_has_its_own_gravity():
+    instant = Instant(0.0, math.log(0.5), 0.0)
+    early = predict_depth(sine_code(), np.array([-1e-3]), instant, 1.0, 1.0, 0.0)[0]
+    assert early == pytest.approx(-0.5e-3 + 0.5 * STANDARD_GRAVITY * 1e-6, rel=1e-9)
