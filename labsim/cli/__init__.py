@@ -20,7 +20,7 @@ import typer
 from .. import __version__
 from ..errors import LabsimError
 
-NOT_COMMANDS = {"options"}
+NOT_COMMANDS = {"options", "measured"}  # shared by commands
 STOPPED = 130  # what shells say of a command that was interrupted
 
 
