@@ -20,6 +20,7 @@ from .screen import Screening, screen
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
+WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 6  # effects that cost runs
 MOST_PAIRS = 3
 CONFUSABLE = 0.9  # cosine of fingerprints
@@ -128,7 +129,7 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
     if not screening.scores:
         return []
     top = screening.scores[0].log_bayes
-    close = [score for score in screening.scores if score.log_bayes > max(top - CLOSE, -1.0)]
+    close = [score for score in screening.scores if score.log_bayes > max(top - CLOSE, WORTHWHILE)]
     costly = [score for score in close if bench.costs_runs(score.name)][:MOST_RERUN]
     free = [score for score in screening.scores if not bench.costs_runs(score.name)]
     fits = []

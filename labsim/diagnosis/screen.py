@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..inference.fitting import Fit, Workbench, amplitude_nodes, nearest_nodes, with_probes
+from ..inference.fitting import Fit, Workbench, amplitude_nodes, with_probes
+from ..inference.grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 from ..records import FloatArray
 
 DRAWS = 20_000
@@ -47,9 +48,9 @@ class Screening:
 def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str] | None = None) -> Screening:
     """Tangents of all effects at the nominal fit (runs at one amplitude and one p_m each) and their scores."""
     names = [name for name in (names or bench.effects) if bench.effects[name].amplitudes]
-    index = nearest_nodes(fit.log_p_m, share=0.5)[:1]
+    index = screening_node(fit.log_p_m)
     wanted = [
-        (name, amplitude, index[0])
+        (name, amplitude, index)
         for name in names
         if bench.costs_runs(name)
         for amplitude in amplitude_nodes(bench, name, 0.0)
@@ -89,6 +90,12 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     p_value = float((np.sum(null >= largest) + 1) / (DRAWS + 1))
     scores.sort(key=lambda score: -score.log_bayes)
     return Screening(scores, names, cosines, p_value, residual, fingerprints)
+
+
+def screening_node(log_p_m: float) -> int:
+    """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
+    whose nominal p_m an effect has driven off still share their fingerprints' runs."""
+    return 2 * round(0.5 * (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
 
 
 def _has_runs(bench: Workbench, name: str) -> bool:
