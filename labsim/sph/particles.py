@@ -47,9 +47,7 @@ def fill_at_rest(
     state[AREA] = setting.spacing**2
     state[MASS] = state[DENSITY] * state[RING] * state[AREA]
     state[PRESSURE] = pressure
-    state[ZERO_STRESS] = porous_dust.solve_zero_stress.py_func(
-        phi, state[PRESSURE], material.bulk_modulus, material.bulk_exponent
-    )
+    state[ZERO_STRESS] = porous_dust.zero_stress_filling_factor(phi, state[PRESSURE], material)
     stiffness = porous_dust.bulk_modulus(phi, material)
     state[SOUND] = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / state[DENSITY])
     state[DXX] = state[DZZ] = state[THICKNESS] = 1.0
