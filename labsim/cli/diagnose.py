@@ -13,7 +13,6 @@ from ..effects import Model, write_model
 from ..inference.runs import RunStore
 from ..inference.summary import calibrate_summary
 from . import options
-from .measured import diagnose_measured, has_tracks
 from .calibrate import (
     BulkModulus,
     Correction,
@@ -23,6 +22,7 @@ from .calibrate import (
     parse_use,
     write_calibration,
 )
+from .measured import diagnose_measured, has_tracks
 
 
 def diagnose(
