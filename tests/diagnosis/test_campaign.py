@@ -1,0 +1,76 @@
+"""Effects hidden in data by an independent simulator are found by reading the campaign folder alone."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labsim.campaign import read_campaign
+from labsim.diagnosis.campaign import diagnose_campaign
+from labsim.diagnosis.judge import judge
+from labsim.inference.fitting import Fit
+from labsim.inference.runs import RunStore
+
+CAMPAIGNS = Path(__file__).parents[2] / "data" / "campaigns"
+TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    """One store for all campaigns of this file: they share most of their runs."""
+    import os
+
+    named = os.environ.get("LABSIM_STORE")
+    return Path(named) if named else tmp_path_factory.mktemp("store")
+
+
+@pytest.mark.parametrize("name", sorted(TRUTH))
+def test_the_hidden_cause_is_named(name, store):
+    found = diagnose_campaign(read_campaign(CAMPAIGNS / name), RunStore(store))
+    truth = TRUTH[name]
+    best, probability = found.verdict.probabilities[0]
+    assert best == (truth["cause"],)
+    assert probability > 0.5
+    assert sum(p for _, p in found.verdict.probabilities) == pytest.approx(1.0, abs=1e-9)
+    low, high = np.quantile(found.posterior_extended.samples("p_m_Pa"), [0.005, 0.995])
+    assert low < truth["pm"] < high
+    if truth["cause"] == "none":
+        assert found.p_value > 0.05
+    else:
+        assert found.p_value < 0.01
+        assert found.gain.fraction_removed > 0.8
+        assert found.gain.log_score_difference > 4
+
+
+def fake_fit(hypothesis, evidence):
+    return Fit(
+        hypothesis,
+        7.0,
+        dict.fromkeys(hypothesis, 0.1),
+        np.eye(1 + len(hypothesis)),
+        1.0,
+        1,
+        0.0,
+        evidence,
+        None,
+        [],
+    )
+
+
+def test_probabilities_follow_bayes():
+    catalogue = ["a", "b", "c", "d"]
+    verdict = judge(fake_fit((), 0.0), [fake_fit(("a",), 3.0)], -1.0, catalogue, {"b": 0.5, "c": -2.0})
+    share = (1 - 0.5 - 0.1 - 0.05) / 4
+    weight = {
+        ("none",): 0.5,
+        ("unknown",): 0.1 * math.exp(-1),
+        ("a",): share * math.exp(3),
+        ("b",): share * math.exp(0.5),
+        ("c",): share * math.exp(-2),
+    }
+    total = sum(weight.values())
+    for hypothesis, probability in verdict.probabilities:
+        assert probability == pytest.approx(weight[hypothesis] / total, rel=1e-12)
+    assert verdict.word == "effect"
