@@ -7,6 +7,7 @@ from typing import Any
 
 from ..diagnosis.campaign import Diagnosis, diagnose_campaign
 from ..diagnosis.next_experiment import suggest
+from ..effects import list_effects
 from ..effects.model import write_model
 from ..inference.calibrate import Calibration, calibrate
 from ..inference.runs import RunStore
@@ -57,7 +58,7 @@ def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]
     suggestions = suggest(found.bench, [found.nominal, *found.rivals], probabilities)
     summary = campaign_diagnosis_summary(found, suggestions)
     options.write_json(folder / "diagnosis.json", summary)
-    write_model(extended_model(found), folder / "model.toml")
+    write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
     (folder / "posterior.nc").unlink(missing_ok=True)
     found.posterior_extended.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
     fits = [("nominal", found.nominal)]

@@ -26,8 +26,19 @@ def predict_drop(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
     log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[name]
     code = model.table.code(log_p_m, model.instant.log_speed, fit.values)
     offset = instrument.row_offset_px * model.observed.pixel
+    offset += contact_offset(bench, fit) * model.radius
     time = model.observed.time
     return predict_depth(code, time, model.instant, instrument.pixel_factor, instrument.rate_factor, offset)
+
+
+def contact_offset(bench: Workbench, fit: Fit) -> float:
+    """Best value, in tip radii, of the offset of the contact that the likelihood allows all drops in common."""
+    linear, size = fit.linear, bench.terms.contact_offset
+    column = np.zeros(linear.residual.size)
+    for model in fit.models:
+        section = linear.sections[model.observed.name]
+        column[section.start : section.start + model.matrix.shape[0]] = size * model.radius
+    return size * float(column @ np.linalg.solve(linear.covariance, linear.residual))
 
 
 def draw_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) -> Path:

@@ -155,9 +155,9 @@ def say_verdict(found: Diagnosis) -> str:
         effect = found.bench.effects[name]
         parameter = effect.amplitudes[0]
         value = parameter.null + found.best.values.get(name, 0.0)
-        parts.append(
-            f"{effect.title[0].lower() + effect.title[1:]} ({name}: {parameter.name} = {value:.3g} {parameter.unit})"
-        )
+        amount = f"{value:.3g} {parameter.unit}".removesuffix(" 1")
+        title = effect.title[0].lower() + effect.title[1:]
+        parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     return (
         f"The simulation is wrong because {' and '.join(parts)}, with probability {probability:.2f}; with it p_m is "
         f"{p_m:.2f} kPa instead of {math.exp(found.nominal.log_p_m) / 1e3:.2f} kPa, and on held-out drops "
