@@ -105,6 +105,14 @@ def test_cupping_is_removed_and_reported(reduced_phantoms):
     assert np.percentile(np.abs(error), 95) <= 0.007
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_total_budget_with_noise_rings_and_cup(reduced_phantoms, seed):
+    error, sigma = residual(*reduced_phantoms(seed=seed, noise=0.03, ring=0.02, cup=0.005))
+    systematic = np.sqrt(max(np.mean(error**2) - np.mean(sigma**2), 0.0))  # what noise does not explain
+    assert abs(error.mean()) <= 0.005
+    assert systematic <= 0.005
+
+
 def test_a_wider_guard_changes_nothing(tmp_path):
     scan = Phantom(noise=0.0).write(tmp_path / "slices")
     three, five = (reduce_scan(scan, guard=g).map.filling_factor for g in (3.0, 5.0))
