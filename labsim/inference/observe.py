@@ -13,10 +13,11 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import Campaign, Drop, FloatArray, Track
-from ..video.track_file import deviate_from_neighbours, read_track
+from ..video.track_file import read_track
 
 STANDARD_GRAVITY = 9.81  # m/s^2, of every free fall, whatever the nominal model holds
-OUTLIER = 5.0  # robust standard deviations from the neighbours
+OUTLIER = 5.0  # standard deviations from the neighbours
+WINDOW = 4  # neighbours on either side
 MARGIN = 4  # frames kept after the depth has stopped growing
 
 
@@ -50,16 +51,8 @@ def observe_drop(drop: Drop, track: Track, sequence_fraction: float) -> Observed
     good = track.valid & np.isfinite(track.tip_row)
     time, row, sigma = track.time[good], track.tip_row[good], track.sigma[good]
     sigma_px = float(np.median(sigma))
-    for _ in range(3):  # outliers hide one another
-        deviation, factor = deviate_from_neighbours(time, row)
-        if deviation.size == 0:
-            break
-        bad = np.abs(deviation) > OUTLIER * sigma_px * factor + 0.25
-        if not bad.any():
-            break
-        # of neighbouring suspects only the worst goes at a time: an outlier drags its neighbours along
-        worst = bad & (np.abs(deviation / factor) >= _maximum_nearby(np.abs(deviation / factor), 2))
-        time, row = time[~worst], row[~worst]
+    stray = np.abs(deviate_robustly(time, row, sigma_px)) > OUTLIER * sigma_px * 1.2 + 0.25
+    time, row = time[~stray], row[~stray]
     depth = (row - drop.camera.surface_row) * pixel
     if depth.size < 12 or depth[0] > 0:
         raise MeasurementError(
@@ -85,9 +78,29 @@ def observe_drop(drop: Drop, track: Track, sequence_fraction: float) -> Observed
     )
 
 
-def _maximum_nearby(values: FloatArray, reach: int) -> FloatArray:
-    padded = np.pad(values, reach)
-    return np.max([padded[k : k + values.size] for k in range(2 * reach + 1)], axis=0)
+def deviate_robustly(time: FloatArray, row: FloatArray, sigma: float) -> FloatArray:
+    """Each row minus the parabola through its WINDOW neighbours on either side, (n,) px; outliers among them count little.
+
+    Reweighted least squares, first with the weights of absolute deviations, then Tukey's: outliers side by side would hide
+    one another from a plain fit, and get their neighbours thrown out.
+    """
+    n = row.size
+    deviation = np.zeros(n)
+    for i in range(n):
+        near = np.array([k for k in range(max(i - WINDOW, 0), min(i + WINDOW + 1, n)) if k != i])
+        x = time[near] - time[i]
+        design = np.vander(x / np.abs(x).max(), 3, increasing=True)
+        weight = np.ones(near.size)
+        for turn in range(12):
+            scaled = design * weight[:, None]
+            best = np.linalg.lstsq(scaled, row[near] * weight, rcond=None)[0]
+            left = np.abs(row[near] - design @ best)
+            if turn < 8:
+                weight = 1 / np.sqrt(np.maximum(left, 0.3 * sigma))
+            else:
+                weight = np.clip(1 - (left / (8 * sigma + 0.2)) ** 2, 1e-3, 1.0)
+        deviation[i] = row[i] - best[0]
+    return deviation
 
 
 def _fit_free_fall(time: FloatArray, depth: FloatArray) -> tuple[float, float]:
