@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..inference.curves import FRACTIONS
 from ..inference.fitting import Fit, Workbench
 from ..records import FloatArray
 
@@ -25,7 +26,9 @@ class Suggestion:
     information_bits: float
 
 
-def suggest(bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ...], float]) -> list[Suggestion]:
+def suggest(
+    bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ...], float]
+) -> list[Suggestion]:
     """Best first. fits: hypotheses with a prediction (the nominal one has the empty name)."""
     standing = [fit for fit in fits if probabilities.get(fit.hypothesis or ("none",), 0.0) > SMALLEST]
     if len(standing) < 2:
@@ -54,26 +57,25 @@ def suggest(bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ..
     return sorted(found, key=lambda each: -each.information_bits)[:5]
 
 
-def _predict(bench: Workbench, fit: Fit, number: int, speed: float) -> FloatArray:
-    """Depths (m) on the stated scale at fractions of the stop that the fit itself predicts, and the stop (s, as a length)."""
-    code = bench.tables[number].code(fit.log_p_m, math.log(speed), fit.values)
+def _predict(bench: Workbench, fit: Fit, number: int, speed: float, shift: float = 0.0) -> FloatArray:
+    """Depths (m) on the stated scale at fractions of the stop that the fit itself predicts, and the stop (as a length, m).
+
+    shift : of ln p_m from the fit's.
+    """
+    code = bench.tables[number].code(fit.log_p_m + shift, math.log(speed), fit.values)
     instrument = next(iter(bench.instruments(fit.values).values()))
     depth, stop = math.exp(code[0]), math.exp(code[1])
-    shape = np.interp(POINTS, np.linspace(0, 1, 41), code[2:43])
+    shape = np.interp(POINTS, FRACTIONS, code[2:])
     return np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
 
 
 def _spread(bench: Workbench, fits: list[Fit], number: int, speed: float, mean: FloatArray) -> FloatArray:
     """Covariance of such a measurement: localisation, sample scatter, numerical error, uncertainty of p_m."""
-    base = _predict(bench, fits[0], number, speed)
-    table, moved = bench.tables[number], []
-    code = table.code(fits[0].log_p_m + 0.01, math.log(speed), fits[0].values)
-    depth, stop = math.exp(code[0]), math.exp(code[1])
-    instrument = next(iter(bench.instruments(fits[0].values).values()))
-    shape = np.interp(POINTS, np.linspace(0, 1, 41), code[2:43])
-    moved = np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
+    base, moved = (_predict(bench, fits[0], number, speed, shift) for shift in (0.0, 0.01))
     tangent = (moved - base) / 0.01
     white = np.median([model.observed.sigma for model in bench.models])
     variance = bench.terms.scatter**2 + fits[0].covariance[0, 0]
     numerical = bench.terms.numerical * mean
-    return white**2 * np.eye(len(mean)) + variance * np.outer(tangent, tangent) + np.outer(numerical, numerical)
+    return (
+        white**2 * np.eye(len(mean)) + variance * np.outer(tangent, tangent) + np.outer(numerical, numerical)
+    )

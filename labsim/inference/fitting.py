@@ -302,13 +302,13 @@ def fit_hypothesis(
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
     names = ("ln_p_m", *hypothesis)
-    widths = {name: _width(bench, name) for name in hypothesis}
     for iteration in range(ITERATIONS):
         if refine:
             _ask(bench, hypothesis, log_p_m, values)
         linear = linearise_at(bench, models, log_p_m, values)
-        priors = {name: (_prior_distance(bench, name, values[name]), widths[name]) for name in hypothesis}
-        step, covariance, _chi, _logdet, weighted = solve_globals(linear.blocks, names, priors)
+        step, covariance, _chi, _logdet, weighted = solve_globals(
+            linear.blocks, names, _priors(bench, values)
+        )
         moved = _limit(bench, hypothesis, step, values)
         new_log = float(np.clip(log_p_m + np.clip(moved[0], -0.7, 0.7), low - 0.7, high + 0.7))
         change = [abs(new_log - log_p_m) / math.sqrt(covariance[0, 0])]
@@ -325,8 +325,7 @@ def fit_hypothesis(
     if refine:
         _ask(bench, hypothesis, log_p_m, values)
     linear = linearise_at(bench, models, log_p_m, values)
-    priors = {name: (_prior_distance(bench, name, values[name]), widths[name]) for name in hypothesis}
-    _step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, priors)
+    _step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
     solved_here = _chi_here(linear)
     n = sum(block.residual.size for block in linear.blocks)
     log_likelihood = -0.5 * (solved_here + logdet + n * math.log(2 * math.pi))
@@ -417,7 +416,7 @@ def amplitude_nodes(bench: Workbench, name: str, amplitude: float) -> list[float
     return nodes
 
 
-def _ask(bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mapping[str, float]) -> int:
+def _ask(bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mapping[str, float]) -> None:
     bench.require_base(enclosing_nodes(log_p_m))
     wanted = [
         (name, amplitude, index)
@@ -428,15 +427,11 @@ def _ask(bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mappi
     ]
     if wanted:
         bench.require_changes(wanted, " and ".join(hypothesis))
-    return len(wanted)
 
 
-def _width(bench: Workbench, name: str) -> float:
-    return bench.effects[name].amplitudes[0].scale
-
-
-def _prior_distance(bench: Workbench, name: str, amplitude: float) -> float:
-    return amplitude
+def _priors(bench: Workbench, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Per effect its distance from null and the width of its prior about it."""
+    return {name: (amplitude, bench.effects[name].amplitudes[0].scale) for name, amplitude in values.items()}
 
 
 def _inside(bench: Workbench, name: str, amplitude: float) -> float:

@@ -105,7 +105,7 @@ def linearise(
     """
     residuals, noises, local, pulls, sections = [], [], [], [], {}
     tangents: dict[str, list[FloatArray]] = {name: [] for name in ("ln_p_m", *probes)}
-    shared: dict[str, list[FloatArray]] = {}
+    shared: dict[str, list[tuple[slice, FloatArray]]] = {}  # one value for several drops
     numerical = []
     at = 0
     for model in models:
@@ -175,9 +175,9 @@ def linearise(
         key = f"{observed.pixel:.6g} {camera.frame_rate:.6g}"
         for kind, moved, width in (("pixel", scale, terms.pixel_scale), ("frame", rate, terms.frame_scale)):
             column = np.concatenate([(moved - here) / 1e-3 * width, pad])
-            _place(shared, f"{kind} {key}", column, sections[name])
+            shared.setdefault(f"{kind} {key}", []).append((sections[name], column))
         offset_column = np.concatenate([np.full(here.size, terms.contact_offset * model.radius), pad])
-        _place(shared, "contact offset", offset_column, sections[name])
+        shared.setdefault("contact offset", []).append((sections[name], offset_column))
         final = float(np.exp(code[0]))
         stop = float(np.exp(code[1]))
         clock = model.matrix @ (observed.time / instrument.rate_factor - instant.contact_time)
@@ -197,8 +197,11 @@ def linearise(
     for model, columns in zip(models, local, strict=True):
         block = sections[model.observed.name]
         covariance[block, block] += columns @ columns.T
-    for placed in _gather(shared, n):
-        covariance += np.outer(placed, placed)
+    for parts in shared.values():
+        whole = np.zeros(n)
+        for section, column in parts:
+            whole[section] = column
+        covariance += np.outer(whole, whole)
     covariance += _numerical_covariance(numerical)
     return Linearised(
         np.concatenate(residuals),
@@ -208,22 +211,6 @@ def linearise(
         local,
         pulls,
     )
-
-
-def _place(shared: dict, key: str, column: FloatArray, section: slice) -> None:
-    entry = shared.setdefault(("placed", key), [])  # type: ignore[arg-type]
-    entry.append((section, column))
-
-
-def _gather(shared: dict, n: int) -> list[FloatArray]:
-    vectors = []
-    for key, entry in shared.items():
-        if isinstance(key, tuple) and key[0] == "placed":
-            vector = np.zeros(n)
-            for section, column in entry:
-                vector[section] = column
-            vectors.append(vector)
-    return vectors
 
 
 def _numerical_covariance(parts: Sequence[tuple[FloatArray, FloatArray, float, float, float]]) -> FloatArray:
