@@ -86,9 +86,11 @@ def diagnose_campaign(
         list(bench.effects),
         {score.name: score.log_bayes for score in screening.scores},
     )
-    best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
-    named = [fit for fit in rivals if fit.hypothesis == verdict.probabilities[0][0]]
-    best = named[0] if named else best
+    first = verdict.probabilities[0][0]
+    if first == ("unknown",):  # the nearest that the catalogue comes to it
+        best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
+    else:
+        best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
     freedom = max(nominal.points - 1 - 2 * len(bench.models), 1)
     omnibus = float(chi2.sf(nominal.chi_square, freedom))
     p_value = min(1.0, 2.0 * min(screening.p_value, omnibus))

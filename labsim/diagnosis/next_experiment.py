@@ -16,6 +16,7 @@ from ..inference.curves import FRACTIONS
 from ..inference.fitting import Fit, Workbench
 from ..records import FloatArray
 
+WORTHWHILE = 0.01  # bits below which an experiment is not suggested
 SMALLEST = 0.005  # probability below which a hypothesis is left out
 POINTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])  # fractions of the stop that are compared
 
@@ -54,7 +55,8 @@ def suggest(
                     round(bits, 3),
                 )
             )
-    return sorted(found, key=lambda each: -each.information_bits)[:5]
+    worth = [each for each in found if each.information_bits >= WORTHWHILE]
+    return sorted(worth, key=lambda each: -each.information_bits)[:5]
 
 
 def _predict(bench: Workbench, fit: Fit, number: int, speed: float, shift: float = 0.0) -> FloatArray:
