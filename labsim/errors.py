@@ -14,6 +14,9 @@ class LabsimError(Exception):
         self.where, self.key, self.message = str(where), key, message
         super().__init__(": ".join(part for part in (self.where, self.key, message) if part))
 
+    def __reduce__(self) -> tuple:
+        return type(self), (self.where, self.key, self.message)  # it crosses processes
+
 
 class CampaignError(LabsimError):
     """A campaign folder that cannot be used as it stands."""

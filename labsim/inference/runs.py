@@ -2,8 +2,10 @@
 
 Input: drop settings (pure data). Output: the runs, in the same order, from the store where they are there and
 simulated where they are not. A run is one HDF5 file named by the hash of its setting and of the solver's sources,
-written aside and renamed: whatever is killed, a file that is there is whole. A lock per run (freed by the operating
-system when its process dies) keeps two processes from doing the same run. A run that blew up is stored as failed.
+written aside and renamed: whatever is killed, a file that is there is whole. Its first 512 bytes (HDF5's user block) hold
+the sha256 of the rest, so that no damaged file is ever taken for a run. A lock per run (freed by the operating system when
+its process dies) keeps two processes from doing the same run. A run that blew up is stored as failed. No time stamp decides
+anything: clocks jump.
 """
 
 from __future__ import annotations
@@ -11,13 +13,13 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
+import io
 import json
 import os
 import time
 import typing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,11 +29,26 @@ import h5py
 import numpy as np
 import platformdirs
 
-from ..errors import InferenceError, SimulationError
+from ..errors import InferenceError, LabsimError, SimulationError
 from ..sph import DropRun, DropSetting, simulate, solver_hash
-from .workers import open_executor
+from .workers import is_loss, open_executor
 
 FORMAT = 1  # of the stored files; part of the key
+HEAD = 512  # bytes before the HDF5 part, the smallest user block there is
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+LARGEST = 1 << 30  # bytes of one array; a damaged file may claim any size
+# whatever a file that was cut, flipped or swapped can make of its readers
+DAMAGE = (
+    OSError,
+    KeyError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    StopIteration,
+    OverflowError,
+    MemoryError,
+)
 Progress = Callable[[float, float, str], None]  # work done, all work (in any unit), what is done
 
 
@@ -95,25 +112,37 @@ class RunStore:
 
     def find(self, setting: DropSetting) -> DropRun | FailedRun | None:
         """The stored run of this setting and this solver, or None (also where its file is damaged)."""
+        key = make_key(setting)
         try:
-            return _read(self.path(make_key(setting)), setting)
-        except (OSError, KeyError, ValueError):
+            return _read(self.path(key), setting, key)
+        except DAMAGE:
             return None
 
     def save(self, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
-        """Write aside, flush to the disk, rename: there is never half a file under a run's name."""
+        """Write aside, flush to the disk, rename: there is never half a file under a run's name. Raises InferenceError."""
         key = make_key(run.setting)
         path = self.path(key)
-        path.parent.mkdir(exist_ok=True)
         aside = path.with_name(f".{key}.{os.getpid()}.part")
         try:
+            path.parent.mkdir(exist_ok=True)
             write_run_file(aside, run, wall)
             with aside.open("rb") as stream:
                 os.fsync(stream.fileno())
             os.replace(aside, path)
+        except OSError as trouble:
+            raise self._refused(trouble) from None
         finally:
-            aside.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                aside.unlink(missing_ok=True)
         return path
+
+    def _refused(self, trouble: OSError) -> InferenceError:
+        return InferenceError(
+            self.folder,
+            "--store",
+            f"cannot be written ({trouble.strerror or trouble}); make room there or name another folder and start "
+            "again, finished runs are kept",
+        )
 
     def get_many(
         self,
@@ -158,18 +187,25 @@ class RunStore:
             while todo or running or elsewhere:
                 while todo and len(running) < slots:
                     key, setting = todo.pop(0)
-                    lock = filelock.FileLock(self.folder / "locks" / key, timeout=0)
+                    lock = self._lock(key)
                     try:
                         lock.acquire()
                     except filelock.Timeout:
                         elsewhere.append((key, setting))  # another process is at it
                         continue
+                    except OSError as trouble:
+                        raise self._refused(trouble) from None
                     if (stored := self.find(setting)) is not None:  # finished elsewhere since we looked
                         lock.release()
                         self.reused += 1
                         yield key, stored
                         continue
-                    running[executor.submit(run_one, setting)] = (key, setting, lock)
+                    try:
+                        future = executor.submit(run_one, setting)
+                    except BaseException:
+                        lock.release()
+                        raise
+                    running[future] = (key, setting, lock)
                 if not running:
                     todo, elsewhere = elsewhere, []
                     if todo:
@@ -184,36 +220,45 @@ class RunStore:
                         lock.release()
                     self.new += 1
                     yield key, run
-        except BrokenProcessPool:
+        except Exception as trouble:
+            if not is_loss(trouble):
+                raise
             raise InferenceError(
                 self.folder,
                 "--workers",
-                "a worker process died (out of memory?); start again with fewer workers, finished runs are stored",
+                f"a worker died ({type(trouble).__name__}; out of memory?); start again, with fewer workers if it is "
+                "memory: finished runs are stored",
             ) from None
         finally:
             for _key, _setting, lock in running.values():
                 lock.release()
+
+    def _lock(self, key: str) -> filelock.FileLock:
+        return filelock.FileLock(self.folder / "locks" / key, timeout=0)
 
     def index(self) -> list[Stored]:
         """All runs, newest first. ``index.json`` only saves reading every file and is made again whenever it is wrong."""
         cache: dict[str, dict] = {}
         path = self.folder / "index.json"
         with contextlib.suppress(OSError, ValueError):
-            cache = json.loads(path.read_text())
+            kept = json.loads(path.read_text())
+            cache = {k: v for k, v in kept.items() if isinstance(v, dict)} if isinstance(kept, dict) else {}
         entries: dict[str, Stored] = {}
         for file in self.folder.glob("??/*.h5"):
             known = cache.get(file.stem)
             size = file.stat().st_size
             if known is not None and known.get("bytes") == size:
-                entries[file.stem] = Stored(**known)
-            else:
-                with contextlib.suppress(OSError, KeyError, ValueError):
-                    entries[file.stem] = _read_label(file)
+                with contextlib.suppress(TypeError):
+                    entries[file.stem] = Stored(**known)
+                    continue
+            with contextlib.suppress(*DAMAGE):
+                entries[file.stem] = _read_label(file)
         fresh = {key: dataclasses.asdict(entry) for key, entry in entries.items()}
         if fresh != cache:
             aside = self.folder / f".index.{os.getpid()}.part"
-            aside.write_text(json.dumps(fresh))
-            os.replace(aside, path)
+            with contextlib.suppress(OSError):  # a store that can only be read is listed all the same
+                aside.write_text(json.dumps(fresh))
+                os.replace(aside, path)
         return sorted(entries.values(), key=lambda entry: -entry.created)
 
     def verify(self) -> list[tuple[Path, str]]:
@@ -221,7 +266,7 @@ class RunStore:
         damaged = []
         for file in sorted(self.folder.glob("??/*.h5")):
             try:
-                with h5py.File(file, "r") as stored:
+                with _open(file) as stored:
                     text = json.dumps([FORMAT, stored.attrs["solver"], stored.attrs["setting_key"]])
                     if (
                         hashlib.sha256(text.encode()).hexdigest() != file.stem
@@ -229,9 +274,9 @@ class RunStore:
                     ):
                         raise ValueError("its name is not the hash of its setting")
                     stored.visititems(
-                        lambda name, item: item[()].size if isinstance(item, h5py.Dataset) else None
+                        lambda name, item: _values(item).size if isinstance(item, h5py.Dataset) else None
                     )
-            except (OSError, KeyError, ValueError) as trouble:
+            except DAMAGE as trouble:
                 damaged.append((file, str(trouble)))
         return damaged
 
@@ -243,7 +288,8 @@ class RunStore:
             if everything or old or (failed and entry.status == "failed"):
                 doomed.add(self.path(entry.key))
         for part in self.folder.glob("??/.*.part"):
-            if time.time() - part.stat().st_mtime > 3600.0:
+            lock = self._lock(part.name.split(".")[1])
+            with contextlib.suppress(filelock.Timeout, OSError), lock:  # nobody is writing it
                 doomed.add(part)
         for file in doomed:
             file.unlink(missing_ok=True)
@@ -306,7 +352,8 @@ def _exact(value: Any) -> Any:
 def write_run_file(path: Path, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
     """A run with its setting as one HDF5 file: arrays as datasets, the rest as attributes (JSON)."""
     setting = run.setting
-    with h5py.File(path, "w") as stored:
+    whole = io.BytesIO()  # HDF5 does not end well on a full disk; plain bytes do
+    with h5py.File(whole, "w", userblock_size=HEAD) as stored:
         stored.attrs.update(
             format=FORMAT,
             key=make_key(setting),
@@ -322,32 +369,60 @@ def write_run_file(path: Path, run: DropRun | FailedRun, wall: float = 0.0) -> P
             stored.attrs["message"] = run.message
         else:
             _pack(stored.create_group("run"), run, skip={"setting"})
+    content = memoryview(whole.getvalue())[HEAD:]
+    path.write_bytes(_head(content) + bytes(content))
     return path
+
+
+def _head(content: memoryview | bytes) -> bytes:
+    text = f"labsim run; sha256 of what follows these {HEAD} bytes: {hashlib.sha256(content).hexdigest()}\n"
+    return text.encode().ljust(HEAD, b"\0")
+
+
+@contextlib.contextmanager
+def _open(path: Path) -> Iterator[h5py.File]:
+    """A stored file whose content is what was written; raises OSError or ValueError where it is not."""
+    content = path.read_bytes()
+    if not content.startswith(SIGNATURE):  # runs of the first days had no head
+        if content[:HEAD] != _head(memoryview(content)[HEAD:]):
+            raise ValueError("its content is not what was written (checksum)")
+    with h5py.File(io.BytesIO(content), "r") as stored:
+        yield stored
+
+
+def _values(item: h5py.Dataset) -> np.ndarray:
+    if item.size * item.dtype.itemsize > LARGEST:
+        raise ValueError(f"an array of {item.shape} is no run's")
+    return np.asarray(item[()])
 
 
 def read_run_file(path: Path | str) -> DropRun | FailedRun:
     """The run in a file, with its setting. Raises InferenceError where it is not a run."""
     try:
-        with h5py.File(path, "r") as stored:
+        with _open(Path(path)) as stored:
             setting = _build(DropSetting, json.loads(stored.attrs["setting"]))
         run = _read(Path(path), setting)
-    except (OSError, KeyError, ValueError, TypeError) as trouble:
+    except LabsimError:
+        raise
+    except DAMAGE as trouble:
         raise InferenceError(path, "", f"is not a stored run ({trouble}); make it again") from None
     assert run is not None
     return run
 
 
-def _read(path: Path, setting: DropSetting) -> DropRun | FailedRun | None:
+def _read(path: Path, setting: DropSetting, key: str | None = None) -> DropRun | FailedRun | None:
     if not path.is_file():
         return None
-    with h5py.File(path, "r") as stored:
+    with _open(path) as stored:
+        if key is not None and stored.attrs["key"] != key:
+            raise ValueError("is another run under this name")
         if stored.attrs["status"] == "failed":
             return FailedRun(setting, str(stored.attrs["message"]))
         return _unpack(stored["run"], DropRun, given={"setting": setting})
 
 
 def _read_label(path: Path) -> Stored:
-    with h5py.File(path, "r") as stored:
+    with _open(path) as stored:
         a = stored.attrs
         return Stored(
             key=str(a["key"]),
@@ -409,7 +484,7 @@ def _unpack(group: h5py.Group, kind: type, given: dict[str, Any] | None = None) 
         if field.name in group:
             item = group[field.name]
             if isinstance(item, h5py.Dataset):
-                values[field.name] = item[()]
+                values[field.name] = item[()] if item.ndim == 0 else _values(item)
             else:
                 nested = [hints[field.name], *typing.get_args(hints[field.name])]
                 record = next(option for option in nested if dataclasses.is_dataclass(option))

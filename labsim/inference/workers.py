@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import platform
 import signal
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.connection import wait
+from typing import Any
 
 from ..errors import InferenceError
 from ..records import Material, Projectile
-from ..sph import DropSetting, simulate
+from ..sph import DropSetting, simulate, solver_hash
 
 
 class InProcess(Executor):
@@ -26,6 +29,35 @@ class InProcess(Executor):
         except Exception as trouble:
             future.set_exception(trouble)
         return future
+
+
+class OnDask(Executor):
+    """Work for the workers of a Dask client; what they return comes back here, they need no disk in common."""
+
+    def __init__(self, client: Any) -> None:
+        self._executor = client.get_executor(pure=False)
+        self._solver = solver_hash()
+
+    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+        return self._executor.submit(run_with_solver, self._solver, fn, *args, **kwargs)
+
+
+def run_with_solver(solver: str, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """``fn(...)`` on a worker; refused where another labsim is installed there, for its numbers would be others."""
+    if solver_hash() != solver:
+        raise InferenceError(
+            platform.node(),
+            "labsim",
+            "another version is installed on this worker; install the one you start from",
+        )
+    return fn(*args, **kwargs)
+
+
+def is_loss(trouble: BaseException) -> bool:
+    """Whether a future failed because its workers, or their scheduler, went away."""
+    return isinstance(trouble, (BrokenProcessPool, CancelledError)) or type(trouble).__module__.startswith(
+        "distributed."
+    )
 
 
 @contextmanager
@@ -112,4 +144,4 @@ def _open_dask(address: str) -> Iterator[tuple[Executor, int]]:
         slots = sum(client.nthreads().values())
         if slots == 0:
             raise InferenceError("", "--scheduler", f"{address} has no workers; start dask worker {address}")
-        yield client.get_executor(pure=False), slots
+        yield OnDask(client), slots
