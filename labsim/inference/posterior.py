@@ -18,6 +18,7 @@ import emcee
 import numpy as np
 
 from ..records import FloatArray
+from .chain import fingerprint, read_chain, write_chain
 from .runs import Progress
 
 REACH = 2.5  # standard deviations at which the residual is measured
@@ -98,27 +99,28 @@ def sample(
 ) -> Posterior:
     """Run walkers from an over-dispersed start until the chain is LONG_ENOUGH and its times have settled.
 
-    log_probability : (m, d) -> (m,). backend : an HDF5 file; where it holds a shorter chain of the same run it is gone on with.
+    log_probability : (m, d) -> (m,). backend : an HDF5 file; where it holds a chain of the same target and seed, that chain is
+    gone on with and ends as it would have ended unbroken, step for step; any other content is replaced.
     R-hat compares the halves of four groups of walkers: single walkers are not independent chains (emcee, Foreman-Mackey et
     al. 2013).
     """
     d = len(names)
     walkers = max(32, WALKERS_PER_PARAMETER * d)
     random = np.random.default_rng(seed)
-    store = emcee.backends.HDFBackend(str(backend)) if backend is not None else None
-    sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True, backend=store)
-    begun = store is not None and store.initialized and store.shape == (walkers, d) and store.iteration > 0
-    if begun:
-        assert store is not None
-        start = store.get_last_sample()
-    else:
-        if store is not None:
-            store.reset(walkers, d)
-        start = random.multivariate_normal(centre, 4.0 * covariance, size=walkers)
+    start = random.multivariate_normal(centre, 4.0 * covariance, size=walkers)
+    mark = fingerprint(tuple(names), seed, start, log_probability(start))
+    kept = read_chain(backend, mark) if backend is not None else None
+    memory = kept or emcee.backends.Backend()
+    sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True, backend=memory)
+    if kept is None:
         sampler.random_state = np.random.RandomState(seed).get_state()
+    else:
+        start = kept.get_last_sample()
     old = np.inf
     tau = np.inf
-    done = store.iteration if store is not None and begun else 0
+    done = memory.iteration
+    if done > CHECK_EVERY:  # what the check before the last one saw
+        old = float(np.max(emcee.autocorr.integrated_time(memory.get_chain()[:-CHECK_EVERY], tol=0)))
     while done < LONGEST:
         tau = float(np.max(sampler.get_autocorr_time(tol=0))) if done >= CHECK_EVERY else np.inf
         if done > LONG_ENOUGH * tau and abs(old - tau) < 0.05 * tau:
@@ -126,6 +128,8 @@ def sample(
         old = tau
         start = sampler.run_mcmc(start, CHECK_EVERY)
         done += CHECK_EVERY
+        if backend is not None:
+            write_chain(backend, memory, mark)
         if progress is not None:
             progress(done, max(done, 2000), "sampling the posterior")
     discard = int(5 * tau)
