@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from .errors import CampaignError
+from .errors import CampaignError, MeasurementError
 from .records import (
     Camera,
     Campaign,
@@ -27,6 +27,7 @@ from .records import (
     Scan,
 )
 from .tables import Document, Table
+from .tracks import find_format, read_rows
 
 SLICE_SUFFIXES = {".tif", ".tiff", ".png", ".bmp"}
 # densities between which a projectile is believed, kg/m^3: a hollow tube up to osmium
@@ -134,7 +135,7 @@ def read_drop(path: Path | str) -> Drop:
     source = _read_source(document)
     document.close()
     if kind == "track":
-        check_track_file(record.path, camera.surface_row)  # type: ignore[arg-type, union-attr]
+        check_track_file(record.path, camera)  # type: ignore[arg-type]
     return Drop(
         name=file.parent.name,
         projectile=projectile,
@@ -189,8 +190,16 @@ def read_scan(path: Path | str) -> Scan | PublishedScan:
     return Scan(file.parent.name, projectile, speed, slices, voxel, first, bits, calibration)  # type: ignore[arg-type]
 
 
-def check_track_file(path: Path, surface_row: float) -> None:
+def check_track_file(path: Path, camera: Camera) -> None:
     """See that a track can be used: a header, numbers, and rows that reach below the surface. Raises CampaignError."""
+    surface_row = camera.surface_row
+    if find_format(path) is not None:
+        try:
+            rows = read_rows(path, camera).row
+        except MeasurementError as trouble:
+            raise CampaignError(trouble.where, trouble.key, trouble.message) from None
+        _check_surface_reached(path, "rows", float(rows.max()), surface_row)
+        return
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
@@ -227,10 +236,14 @@ def check_track_file(path: Path, surface_row: float) -> None:
                 previous = value
             else:
                 deepest = max(deepest, value)
+    _check_surface_reached(path, "tip_row_px", deepest, surface_row)
+
+
+def _check_surface_reached(path: Path, column: str, deepest: float, surface_row: float) -> None:
     if deepest <= surface_row:
         raise CampaignError(
             path,
-            "tip_row_px",
+            column,
             f"the track never reaches the surface (largest row {deepest:g}, surface_row_px {surface_row:g}); "
             "rows grow downwards: check surface_row_px",
         )

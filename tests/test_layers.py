@@ -10,7 +10,7 @@ import labsim
 ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
-    {"tables"},
+    {"tables", "tracks"},
     {"campaign", "video", "ct", "sph"},  # siblings that never import each other
     {"effects"},
     {"inference"},

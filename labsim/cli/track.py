@@ -14,6 +14,7 @@ from .. import video
 from ..campaign import read_drop
 from ..errors import LabsimError, MeasurementError
 from ..records import Camera, DecelerationCurve, Drop, Measured, Track
+from ..tracks import find_format
 from . import options
 
 
@@ -33,7 +34,9 @@ class Request:
 def track(
     drop: Annotated[
         Path,
-        typer.Argument(help="Drop folder (with drop.toml), video file, folder of pictures or track.csv."),
+        typer.Argument(
+            help="Drop folder (with drop.toml), video file, folder of pictures, track.csv, or another program's track."
+        ),
     ],
     out: options.Out = None,
     fps: Annotated[float | None, typer.Option("--fps", help="Frames per second of the recording.")] = None,
@@ -76,10 +79,11 @@ def track(
     folder = options.make_output_folder(out, drop, "track")
     seen: video.Tracking | None = None
     frames: video.Frames | None = None
-    if request.source.is_file() and request.source.suffix.lower() in {".csv", ".txt"}:
+    if _is_track_file(request.source):
         rate = _need(request.fps, request.source, "--fps", "give the frame rate with --fps")
         row = request.surface.value if request.surface else float("nan")
-        found = video.read_track(request.source, Camera(rate, 1.0, row, 0.0), request.row_sigma)
+        pixel = request.pixel_size.value if request.pixel_size else float("nan")
+        found = video.read_track(request.source, Camera(rate, pixel, row, 0.0), request.row_sigma)
     else:
         frames = video.open_frames(request.source).turned(rotate)
         if part is not None:
@@ -132,6 +136,10 @@ def _read_request(
             [],
         )
     return Request(path, None, fps, pixel, surface, row_sigma, [])
+
+
+def _is_track_file(path: Path) -> bool:
+    return path.is_file() and (path.suffix.lower() in {".csv", ".txt"} or find_format(path) is not None)
 
 
 def _read_range(text: str) -> tuple[int, int]:

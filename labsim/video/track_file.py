@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from ..errors import MeasurementError
-from ..records import Camera, Track
+from ..records import Camera, FloatArray, Track
+from ..tracks import find_format, read_rows
 
 
 def read_track(path: Path | str, camera: Camera, row_sigma: float | None) -> Track:
@@ -17,9 +18,12 @@ def read_track(path: Path | str, camera: Camera, row_sigma: float | None) -> Tra
     Missing frames stay missing: time = frame / frame rate unless the file brings its own ``time_s``. An empty
     tip_row_px is a frame without a position (valid = False). Outliers are kept; ``fit_deceleration`` finds them.
     ``row_sigma`` (px) holds for every frame that the file gives no ``sigma_px`` for; where there is neither, the
-    scatter about the local motion is measured and used. Raises MeasurementError.
+    scatter about the local motion is measured and used. Files of other programs (labsim/tracks) are read alike.
+    Raises MeasurementError.
     """
     path = Path(path)
+    if find_format(path) is not None:
+        return _make_track(path, camera, row_sigma)
     try:
         table = pd.read_csv(path, comment="#", skipinitialspace=True, encoding_errors="replace")
     except FileNotFoundError:
@@ -61,6 +65,25 @@ def read_track(path: Path | str, camera: Camera, row_sigma: float | None) -> Tra
     row = numbers["tip_row_px"]
     time = numbers.get("time_s", frame / camera.frame_rate)
     time = np.where(np.isfinite(time), time, frame / camera.frame_rate)
+    return _finish(path, frame, time, row, numbers.get("sigma_px"), row_sigma)
+
+
+def _make_track(path: Path, camera: Camera, row_sigma: float | None) -> Track:
+    """A Track from another program's file."""
+    rows = read_rows(path, camera)
+    sigma = rows.sigma if np.any(np.isfinite(rows.sigma)) else None
+    return _finish(path, rows.frame, rows.frame / camera.frame_rate, rows.row, sigma, row_sigma)
+
+
+def _finish(
+    path: Path,
+    frame: np.ndarray,
+    time: FloatArray,
+    row: FloatArray,
+    own_sigma: FloatArray | None,
+    row_sigma: float | None,
+) -> Track:
+    """Error bars and gaps, the same for every format."""
     valid = np.isfinite(row)
     warnings = []
     missing = int(frame[-1] - frame[0] + 1 - len(frame)) + int(np.sum(~valid))
@@ -72,9 +95,9 @@ def read_track(path: Path | str, camera: Camera, row_sigma: float | None) -> Tra
             raise MeasurementError(
                 path, "tip_row_px", "too few frames to measure their scatter; give row_sigma_px"
             )
-        if "sigma_px" not in numbers:
+        if own_sigma is None:
             warnings.append(f"no error bar given; scatter about the local motion is {row_sigma:.3f} px")
-    sigma = numbers.get("sigma_px", np.full(len(row), np.nan))
+    sigma = own_sigma if own_sigma is not None else np.full(len(row), np.nan)
     sigma = np.where(np.isfinite(sigma) & (sigma > 0), sigma, row_sigma)
     return Track(
         frame=frame.astype(np.int64),
