@@ -19,6 +19,7 @@ import typer
 
 from .. import __version__
 from ..errors import LabsimError
+from . import _provenance
 
 NOT_COMMANDS = {"options", "measured"}  # shared by commands
 STOPPED = 130  # what shells say of a command that was interrupted
@@ -79,12 +80,22 @@ _UsageTrouble: Any = next(base for base in typer.BadParameter.__mro__ if base.__
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and leave: 0 done, 2 bad input (one line on standard error), 130 stopped by the user."""
+    given = sys.argv[1:] if arguments is None else [str(each) for each in arguments]
+    _provenance.remember(given)
     try:
-        status = app(
-            args=None if arguments is None else list(arguments), prog_name="labsim", standalone_mode=False
-        )
+        status = app(args=given, prog_name="labsim", standalone_mode=False)
     except LabsimError as trouble:
         status = _complain(str(trouble), 2)
+    except BrokenPipeError:  # head, or a pager that was left
+        sys.stdout = None  # type: ignore[assignment]
+        status = 0
+    except (
+        OSError
+    ) as trouble:  # of the machine, not of the input: no room, no right to write, a disk that is gone
+        reason = trouble.strerror or str(trouble)
+        status = _complain(f"{trouble.filename or 'disk'}: {reason}; mend that and start again", 2)
+    except MemoryError:
+        status = _complain("memory: is not enough; use fewer --workers or smaller input", 2)
     except _UsageTrouble as trouble:
         if type(trouble).__name__ == "NoArgsIsHelpError":
             typer.echo(trouble.format_message())

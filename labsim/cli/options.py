@@ -15,6 +15,7 @@ from typing import Annotated, Any, Protocol
 import typer
 
 from ..errors import LabsimError
+from . import _provenance
 
 Out = Annotated[
     Path | None, typer.Option("--out", "-o", help="Output folder. Default: a new folder beside the input.")
@@ -63,7 +64,12 @@ def make_output_folder(out: Path | None, source: Path, command: str) -> Path:
 
 
 def write_json(path: Path, summary: dict[str, Any]) -> Path:
-    """Write a summary file; a number that is not finite becomes null, and a killed command leaves no half file."""
+    """Write a summary file; a number that is not finite becomes null, and a killed command leaves no half file.
+
+    The summary gets ``made_by``: command, versions, solver, inputs and seed, which ``labsim rerun`` goes by.
+    """
+    if (made_by := _provenance.describe()) is not None:
+        summary[_provenance.KEY] = made_by
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     aside.write_text(json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     os.replace(aside, path)
