@@ -16,7 +16,7 @@ FLOORS = [
     {"inference"},
     {"diagnosis"},
     {"report"},
-    {"cli"},
+    {"api", "cli"},
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

@@ -247,13 +247,7 @@ def _write(
     title = f"{request.drop.name if request.drop else request.source.name}"
     if curve is not None:
         camera = _camera(request, found)
-        names = ("depth", "velocity", "acceleration")
-        units = ("m", "m_s", "m_s2")
-        table = {"time_s": curve.time}
-        for name, unit in zip(names, units, strict=True):
-            table[f"{name}_{unit}"] = getattr(curve, name)
-            table[f"{name}_sigma_{unit}"] = getattr(curve, f"{name}_sigma")
-        pd.DataFrame(table).to_csv(folder / "curve.csv", index=False, float_format="%.8g")
+        video.write_curve(curve, folder / "curve.csv")
         local = video.fit_local_polynomial(found, camera, curve)
         pd.DataFrame(local).to_csv(folder / "curve_local.csv", index=False, float_format="%.8g")
         track_figures.draw_track(found, camera, curve, local, folder / "track.png", title)

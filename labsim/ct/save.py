@@ -76,8 +76,8 @@ def dust_mass(scan_map: FillingMap, density_solid: float) -> float:
     return float(np.nansum(scan_map.filling_factor * cell_volumes(scan_map)) * density_solid)
 
 
-def write_map(reduced: ReducedScan, path: Path) -> Path:
-    """map.nc: phi, phi_sigma, count, asymmetry over (z, r) in m, opens with xarray."""
+def make_dataset(reduced: ReducedScan) -> xr.Dataset:
+    """phi, phi_sigma, count, asymmetry over (z, r) in m; what map.nc holds."""
     scan_map = reduced.map
     attributes = {
         "tip_depth_m": scan_map.tip_depth, "bead_radius_m": scan_map.bead_radius, "axis_px": list(scan_map.axis_px),
@@ -87,12 +87,16 @@ def write_map(reduced: ReducedScan, path: Path) -> Path:
     }  # fmt: skip
     names = {"phi": scan_map.filling_factor, "phi_sigma": scan_map.sigma, "count": scan_map.count,
              "asymmetry": reduced.errors.asymmetry}  # fmt: skip
-    dataset = xr.Dataset(
+    return xr.Dataset(
         {name: (("z", "r"), np.asarray(values, float)) for name, values in names.items()},
         coords={"r": ("r", scan_map.r, {"units": "m"}), "z": ("z", scan_map.z, {"units": "m"})},
         attrs=attributes,
     )
-    dataset.to_netcdf(path, engine="h5netcdf")
+
+
+def write_map(reduced: ReducedScan, path: Path) -> Path:
+    """map.nc: ``make_dataset``, opens with xarray and every netCDF-4 reader."""
+    make_dataset(reduced).to_netcdf(path, engine="h5netcdf")
     return path
 
 

@@ -8,7 +8,7 @@ from .frames import Frames, open_frames
 from .local import fit_local_polynomial
 from .overlay import draw_contact_sheet, write_overlay
 from .scale import measure_ruler, scale_from_diameter
-from .track_file import read_track, write_track
+from .track_file import read_track, tabulate_curve, tabulate_track, write_curve, write_track
 from .tracker import Tracking, follow_projectile, track_projectile
 
 __all__ = [
@@ -24,7 +24,10 @@ __all__ = [
     "read_picture",
     "read_track",
     "scale_from_diameter",
+    "tabulate_curve",
+    "tabulate_track",
     "track_projectile",
+    "write_curve",
     "write_overlay",
     "write_track",
 ]

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import MeasurementError
-from ..records import Camera, FloatArray, Track
+from ..records import Camera, DecelerationCurve, FloatArray, Track
 from ..tracks import find_format, read_rows
 
 
@@ -110,10 +110,9 @@ def _finish(
     )
 
 
-def write_track(track: Track, path: Path | str) -> Path:
-    """Write frame, time_s, tip_row_px, sigma_px, reason; rows of rejected frames stay empty."""
-    path = Path(path)
-    table = pd.DataFrame(
+def tabulate_track(track: Track) -> pd.DataFrame:
+    """frame, time_s, tip_row_px, sigma_px, reason; rows of rejected frames are NaN."""
+    return pd.DataFrame(
         {
             "frame": track.frame,
             "time_s": track.time,
@@ -122,7 +121,28 @@ def write_track(track: Track, path: Path | str) -> Path:
             "reason": track.reason,
         }
     )
-    table.to_csv(path, index=False, float_format="%.9g")
+
+
+def tabulate_curve(curve: DecelerationCurve) -> pd.DataFrame:
+    """The columns of curve.csv: time_s, then depth_m, velocity_m_s, acceleration_m_s2, each followed by its sigma."""
+    table = {"time_s": curve.time}
+    for name, unit in (("depth", "m"), ("velocity", "m_s"), ("acceleration", "m_s2")):
+        table[f"{name}_{unit}"] = getattr(curve, name)
+        table[f"{name}_sigma_{unit}"] = getattr(curve, f"{name}_sigma")
+    return pd.DataFrame(table)
+
+
+def write_track(track: Track, path: Path | str) -> Path:
+    """Write ``tabulate_track`` as CSV; rows of rejected frames stay empty."""
+    path = Path(path)
+    tabulate_track(track).to_csv(path, index=False, float_format="%.9g")
+    return path
+
+
+def write_curve(curve: DecelerationCurve, path: Path | str) -> Path:
+    """Write ``tabulate_curve`` as CSV."""
+    path = Path(path)
+    tabulate_curve(curve).to_csv(path, index=False, float_format="%.8g")
     return path
 
 

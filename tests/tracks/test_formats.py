@@ -252,6 +252,7 @@ def test_labsims_own_tracks_are_left_alone() -> None:
     assert find_format(DATA / "campaigns/p01/drops/D05/track.csv") is None
 
 
+@pytest.mark.filterwarnings("ignore:The inplace keyword")  # trackpy 0.7 on pandas 3
 def test_a_linked_data_frame_of_trackpy(tmp_path: Path) -> None:
     """trackpy itself, where it is installed: a bright blob that falls, located and linked."""
     trackpy = pytest.importorskip("trackpy")

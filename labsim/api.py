@@ -1,0 +1,212 @@
+"""The verbs of labsim for scripts and notebooks: records in, records out, nothing written but stored runs.
+
+Each function is a few lines over the layer that does the work; the command line does the same and writes files. In a script
+(not in a notebook) long work belongs under ``if __name__ == "__main__":``, since worker processes import the script again; or
+say ``workers=1``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import CampaignError, MeasurementError
+from .records import Camera, Campaign, CompressedVolume, DecelerationCurve, Drop, FloatArray, Scan, Track
+
+if TYPE_CHECKING:  # pragma: no cover
+    import pandas as pd
+
+    from .ct import ReducedScan
+    from .diagnosis.campaign import Diagnosis
+    from .diagnosis.summary import SummaryDiagnosis
+    from .inference.calibrate import Calibration
+    from .inference.runs import RunStore
+    from .inference.summary import SummaryCalibration
+    from .sph import DropRun, DropSetting
+
+
+def track(
+    source: Path | str | Drop,
+    *,
+    frame_rate: float | None = None,
+    pixel_size: float | None = None,
+    surface_row: float | None = None,
+    surface_row_sigma: float = 0.15,
+    row_sigma: float | None = None,
+) -> tuple[Track, DecelerationCurve]:
+    """Follow a projectile, or read a finished track, and fit its motion.
+
+    source : a drop of a campaign, its folder, a video, a folder of pictures, or a track file of any format labsim reads.
+    frame_rate : Hz. pixel_size : m. surface_row, surface_row_sigma, row_sigma : px, rows grow downwards. What is left out comes
+    from the drop, or for a video from its own pictures (surface). Returns the track (rows, px) and the deceleration curve (SI,
+    time zero at contact). Raises MeasurementError where something is not known or nothing can be tracked.
+    """
+    from . import video
+    from .campaign import read_drop
+    from .tracks import find_format
+
+    if not isinstance(source, Drop) and (Path(source) / "drop.toml").is_file():
+        source = read_drop(source)
+    if isinstance(source, Drop):
+        if source.camera is None or source.record.path is None:
+            raise MeasurementError(
+                source.name, "record.kind", "is summary: published figures hold nothing to track"
+            )
+        frame_rate = frame_rate or source.camera.frame_rate
+        pixel_size = pixel_size or source.camera.pixel_size
+        row_sigma = row_sigma or source.record.row_sigma
+        if surface_row is None:
+            surface_row, surface_row_sigma = source.camera.surface_row, source.camera.surface_row_sigma
+        path = source.record.path
+    else:
+        path = Path(source)
+    if pixel_size is None:
+        raise MeasurementError(path, "pixel_size", "is not known; give it in m")
+    if path.is_file() and (path.suffix.lower() in {".csv", ".txt"} or find_format(path) is not None):
+        if frame_rate is None or surface_row is None:
+            raise MeasurementError(path, "frame_rate, surface_row", "are not in a table; give both")
+        camera = Camera(frame_rate, pixel_size, surface_row, surface_row_sigma)
+        found = video.read_track(path, camera, row_sigma)
+    else:
+        seen = video.follow_projectile(
+            video.open_frames(path), frame_rate=frame_rate, surface_row=surface_row
+        )
+        found = seen.track
+        if surface_row is None:
+            if seen.surface is None:
+                raise MeasurementError(path, "surface_row", "is not seen in the pictures; give it in px")
+            surface_row, surface_row_sigma = seen.surface.value, seen.surface.sigma
+        rate = frame_rate or (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+        camera = Camera(rate, pixel_size, surface_row, surface_row_sigma)
+    return found, video.fit_deceleration(found, camera, name=path)
+
+
+def reduce_scan(source: Path | str | Scan, **settings: Any) -> ReducedScan:
+    """Slices to the axisymmetric map of the filling factor; its ``map`` is a FillingMap.
+
+    source : a scan of a campaign or its folder. settings : as ``labsim.ct.reduce_scan`` takes them (cell, guard …).
+    Raises CampaignError, MeasurementError.
+    """
+    from . import ct
+    from .campaign import read_scan
+
+    scan = source if isinstance(source, Scan) else read_scan(source)
+    if not isinstance(scan, Scan):
+        raise CampaignError(
+            source, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
+        )
+    return ct.reduce_scan(scan, **settings)
+
+
+def simulate(
+    setting: DropSetting | Sequence[DropSetting],
+    *,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Any:
+    """Simulate one drop, or many at once; what the store holds is read, not run.
+
+    setting : labsim.DropSetting. store : folder of the stored runs (default: LABSIM_STORE or the user's cache). workers :
+    processes (default: one a core). scheduler : address of a Dask scheduler. Returns a DropRun, or a list in the same order.
+    Raises SimulationError for a setting outside the solver's limits or a run that failed.
+    """
+    from .inference.runs import require_runs
+    from .sph import DropSetting, check_setting
+
+    single = isinstance(setting, DropSetting)
+    wanted = [setting] if isinstance(setting, DropSetting) else list(setting)
+    for each in wanted:
+        check_setting(each)
+    runs: list[DropRun] = require_runs(_open(store).get_many(wanted, workers=workers, scheduler=scheduler))
+    return runs[0] if single else runs
+
+
+def calibrate(
+    campaign: Campaign | Path | str,
+    parameters: Sequence[str] = ("p_m",),
+    *,
+    store: Path | str | None = None,
+    **settings: Any,
+) -> Calibration | SummaryCalibration:
+    """The posterior of p_m (Pa), and of effects named in ``parameters``.
+
+    settings : workers, scheduler, seed, progress, and what ``labsim.inference.calibrate.calibrate`` takes for tracks and
+    ``labsim.inference.summary.calibrate_summary`` for published figures. Raises LabsimError.
+    """
+    read = _read(campaign)
+    if _has_tracks(read):
+        from .inference.calibrate import calibrate as calibrate_tracks
+
+        return calibrate_tracks(read, parameters, store=_open(store), **settings)
+    from .inference.summary import calibrate_summary
+
+    return calibrate_summary(read, _open(store), **settings)
+
+
+def diagnose(
+    campaign: Campaign | Path | str, *, store: Path | str | None = None, **settings: Any
+) -> Diagnosis | SummaryDiagnosis:
+    """What the calibrated simulation gets wrong about a campaign, why, and what an extended model gains.
+
+    settings : workers, scheduler, progress, and for tracks what ``labsim.diagnosis.campaign.diagnose_campaign`` takes
+    (seed, cells). Raises LabsimError.
+    """
+    read, opened = _read(campaign), _open(store)
+    if _has_tracks(read):
+        from .diagnosis.campaign import diagnose_campaign
+
+        return diagnose_campaign(read, opened, **settings)
+    from .diagnosis.summary import diagnose_summary
+    from .inference.summary import calibrate_summary
+
+    return diagnose_summary(calibrate_summary(read, opened, **settings), opened, **settings)
+
+
+def tabulate(thing: Track | DecelerationCurve | CompressedVolume | DropRun) -> pd.DataFrame:
+    """A pandas table, one line a frame, instant or threshold; its columns are those of the CSV files, with units.
+
+    Maps are not tables: ``labsim.ct.make_dataset(reduced)`` gives xarray. Raises TypeError for anything else.
+    """
+    import pandas as pd
+
+    if isinstance(thing, Track):
+        from .video import tabulate_track
+
+        return tabulate_track(thing)
+    if isinstance(thing, DecelerationCurve):
+        from .video import tabulate_curve
+
+        return tabulate_curve(thing)
+    if isinstance(thing, CompressedVolume):
+        return pd.DataFrame({"phi": thing.filling_factor, "volume_m3": thing.volume, "sigma": thing.sigma})
+    from .sph import DropRun
+
+    if isinstance(thing, DropRun):
+        force = (
+            "force_N_m" if thing.setting.geometry == "planar" else "force_N"
+        )  # planar: per metre of cylinder
+        columns: dict[str, FloatArray] = {"time_s": thing.time, "depth_m": thing.depth}
+        return pd.DataFrame({**columns, "velocity_m_s": thing.velocity, force: thing.force})
+    raise TypeError(
+        f"{type(thing).__name__} is no table; give a Track, DecelerationCurve, CompressedVolume or DropRun"
+    )
+
+
+def _read(campaign: Campaign | Path | str) -> Campaign:
+    if isinstance(campaign, Campaign):
+        return campaign
+    from .campaign import read_campaign
+
+    return read_campaign(campaign)
+
+
+def _open(store: Path | str | None) -> RunStore:
+    from .inference.runs import RunStore
+
+    return RunStore(store)
+
+
+def _has_tracks(campaign: Campaign) -> bool:
+    return any(drop.record.kind != "summary" for drop in campaign.drops)

@@ -1,0 +1,104 @@
+"""The verbs for scripts: quick to import, and the same answers as the layers below."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import labsim
+from labsim.ct import compress, make_dataset, write_compressed, write_map
+from labsim.errors import CampaignError, MeasurementError
+from labsim.video import write_curve, write_track
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+def test_import_is_quick_and_light() -> None:
+    """Half a second is the bound here for a loaded machine; a quiet one needs 0.05 s."""
+    code = "import time; b = time.perf_counter(); import labsim, sys; print(time.perf_counter() - b); print(*sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    first, modules = out.split("\n")[:2]
+    assert float(first) < 0.5
+    assert not {"numpy", "numba", "pandas", "matplotlib", "labsim.api"} & set(modules.split())
+
+
+def test_every_public_name_is_there() -> None:
+    for name in labsim.__all__:
+        assert getattr(labsim, name) is not None
+        assert name in dir(labsim)
+    for name in ("track", "reduce_scan", "simulate", "calibrate", "diagnose", "tabulate", "read_campaign"):
+        assert getattr(labsim, name).__doc__
+    with pytest.raises(AttributeError, match="no attribute 'calibrat'"):
+        labsim.calibrat  # noqa: B018
+
+
+def test_a_drop_of_a_campaign_as_tables(tmp_path: Path) -> None:
+    """Track and curve to pandas and to CSV and back."""
+    drop = labsim.read_campaign(DATA / "campaigns/p01").drops[4]
+    track, curve = labsim.track(drop)
+    again, _ = labsim.track(DATA / "campaigns/p01/drops" / drop.name)
+    assert np.array_equal(track.tip_row, again.tip_row)
+    assert curve.impact_speed.value == pytest.approx(np.sqrt(2 * 9.81 * drop.height.value), rel=0.02)
+    table = labsim.tabulate(curve)
+    assert list(table.columns)[:3] == ["time_s", "depth_m", "depth_sigma_m"]
+    read = pd.read_csv(write_curve(curve, tmp_path / "curve.csv"))
+    assert list(read.columns) == list(table.columns)
+    assert np.allclose(read, table, rtol=1e-7, atol=1e-12, equal_nan=True)
+    read = pd.read_csv(write_track(track, tmp_path / "track.csv"))
+    assert np.allclose(read["tip_row_px"], labsim.tabulate(track)["tip_row_px"], equal_nan=True)
+
+
+def test_a_file_needs_its_scales() -> None:
+    path = DATA / "campaigns/p01/drops/D05/track.csv"
+    with pytest.raises(MeasurementError, match="pixel_size"):
+        labsim.track(path)
+    with pytest.raises(MeasurementError, match="frame_rate, surface_row"):
+        labsim.track(path, pixel_size=2e-5)
+    with pytest.raises(MeasurementError, match="summary"):
+        labsim.track(DATA / "guettler2009/drops/D01")
+
+
+def test_a_video_without_a_surface_row(tmp_path: Path) -> None:
+    track, curve = labsim.track(
+        DATA / "video/rendered_drops/mjpeg/video.avi", frame_rate=10000.0, pixel_size=20e-6
+    )
+    assert len(track.frame) > 50 and curve.penetration_depth.value > 2e-4
+
+
+def test_a_map_as_netcdf(tmp_path: Path) -> None:
+    """map.nc opens with xarray and with a plain netCDF-4 reader's view of HDF5, with units and dimensions."""
+    reduced = labsim.reduce_scan(DATA / "ct/labelled_scans/p05-C02")
+    path = write_map(reduced, tmp_path / "map.nc")
+    with xr.open_dataset(path) as read:
+        assert dict(read.sizes) == dict(make_dataset(reduced).sizes)
+        assert read["phi"].dims == ("z", "r") and read["r"].attrs["units"] == "m"
+        assert np.array_equal(read["phi"].values, reduced.map.filling_factor, equal_nan=True)
+        assert read.attrs["tip_depth_m"] == reduced.map.tip_depth
+    curve = compress(reduced.map)
+    read_back = pd.read_csv(write_compressed(curve, tmp_path / "v.csv"))
+    assert np.allclose(read_back, labsim.tabulate(curve), rtol=1e-7)
+    with pytest.raises(CampaignError, match="nothing to reduce"):
+        labsim.reduce_scan(DATA / "guettler2009/ct/C01")
+
+
+def test_a_run_is_simulated_once(tmp_path: Path) -> None:
+    setting = labsim.DropSetting(
+        labsim.Projectile("hemisphere", 5e-4, 1.33e-6), 0.4, labsim.Material(p_m=4000.0), spacing=1.25e-4
+    )
+    run = labsim.simulate(setting, store=tmp_path, workers=1)
+    again = labsim.simulate([setting, setting], store=tmp_path, workers=1)
+    assert again[0].penetration_depth == again[1].penetration_depth == run.penetration_depth > 1e-4
+    assert list(labsim.tabulate(run).columns) == ["time_s", "depth_m", "velocity_m_s", "force_N"]
+    with pytest.raises(labsim.LabsimError, match="spacing"):
+        labsim.simulate(setting.replace(spacing=5e-4), store=tmp_path)
+
+
+def test_tabulate_says_what_it_takes() -> None:
+    with pytest.raises(TypeError, match="int is no table"):
+        labsim.tabulate(3)
