@@ -17,6 +17,7 @@ from ..records import Campaign
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Screening, screen
+from .shapes import lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
@@ -75,9 +76,10 @@ def diagnose_campaign(
         use_scans=use_scans,
         cells=cells,
     )
+    lay_out_shapes(bench)
     screening = screen(bench, nominal, random)
     unknown = fit_unknown(bench, nominal)
-    rivals = confirm_singles(bench, nominal, screening)
+    rivals, screening = merge_variants(bench, nominal, confirm_singles(bench, nominal, screening), screening)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
     verdict = judge(
         nominal,
@@ -98,7 +100,7 @@ def diagnose_campaign(
     held_best = predict_held_out(bench, best)
     scatter = estimate_scatter(bench, nominal)
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
-    warnings += warn_unused_scans(campaign, bench)
+    warnings += warn_unused_scans(bench)
     low, high = campaign.p_m_range
     if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
         warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")

@@ -48,7 +48,7 @@ def predict_held_out(bench: Workbench, fit: Fit) -> HeldOut:
         width = bench.effects[name].amplitudes[0].scale
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
-    for block in linear.scans:  # scans are never held out
+    for block in linear.further:  # scans are never held out
         factor = cho_factor(block.covariance, lower=True)
         columns = np.stack([block.tangents[name] for name in names], axis=1)
         solved = cho_solve(factor, columns)

@@ -55,7 +55,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
         if bench.costs_runs(name)
         for amplitude in amplitude_nodes(bench, name, 0.0)
     ]
-    bench.require_changes(wanted, "fingerprints")
+    bench.require_changes(wanted, "fingerprints", coarse=True)
     names = [name for name in names if not bench.costs_runs(name) or _has_runs(bench, name)]
     linear = with_probes(bench, fit, names)
     whitened = np.concatenate(
@@ -82,6 +82,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
         width = bench.effects[name].amplitudes[0].scale
         snr = (lengths[k] * width) ** 2
         log_bayes = 0.5 * z[k] ** 2 * snr / (1 + snr) - 0.5 * math.log1p(snr)
+        log_bayes += bench.shape_evidence.get(name, 0.0)
         scores.append(Score(name, float(z[k]), float(lengths[k]), float(z[k] / lengths[k]), float(log_bayes)))
     cosines = unit.T @ unit
     largest = float(np.max(z**2)) if len(z) else 0.0
@@ -100,4 +101,7 @@ def screening_node(log_p_m: float) -> int:
 
 def _has_runs(bench: Workbench, name: str) -> bool:
     tables = [*bench.tables, *(scan.table for scan in bench.scans)]
-    return all(any(entry for entry in table.changes.get(name, {}).values()) for table in tables)
+    return all(
+        any(entry for entry in (table.changes.get(name) or table.fingerprints.get(name, {})).values())
+        for table in tables
+    )

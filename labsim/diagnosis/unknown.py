@@ -1,30 +1,47 @@
 """The hypothesis that something is wrong which no listed cause explains: a smooth force law without a name.
 
 It competes with the causes on equal terms: residuals are a Gaussian process, orthogonal to nothing, whose size is
-integrated over a few values. What it finds is drawn as the shape of what is missing. Blocks: ``depth and speed`` (a law
-smooth over the way into the dust, speed and size), ``drop`` (every drop its own offset).
+integrated over a few values. What it finds is drawn as the shape of what is missing. What may deviate stands in FREEDOMS: a
+force law smooth over the way into the dust, speed and size; every drop by its own offset; the layering of undisturbed dust.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..inference.blocks import Block
 from ..inference.fitting import Fit, Workbench
 from ..inference.likelihood import solve_globals
-from ..inference.scans import Block
 from ..records import FloatArray
 
-MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map by 3 %
 SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth
-BLOCKS = {"depth and speed": (0.35, 0.5, 0.5), "drop": (1.0, 1e-3, 1e-3)}
+MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map, or the undisturbed dust, by 3 %
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What may deviate. scales : of the law over (fraction of the way, ln speed, ln size), None where drops may not deviate;
+    in_maps, in_dust : whether the compacted zone and the undisturbed dust may."""
+
+    scales: tuple[float, float, float] | None
+    in_maps: bool = True
+    in_dust: bool = False
+
+
+FREEDOMS = {
+    "depth and speed": Freedom((0.35, 0.5, 0.5)),
+    "drop": Freedom((1.0, 1e-3, 1e-3)),
+    "undisturbed dust": Freedom(None, in_maps=False, in_dust=True),
+    "depth and speed and undisturbed dust": Freedom((0.35, 0.5, 0.5), in_dust=True),
+}
 
 
 @dataclass(frozen=True)
 class UnknownFit:
-    """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean, m, per datum."""
+    """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean per datum of the drops, m."""
 
     evidence: float
     block: str
@@ -39,41 +56,35 @@ def fit_unknown(bench: Workbench, fit: Fit) -> UnknownFit:
     linear = fit.linear
     coordinates = law_coordinates(fit)
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    n = sum(block.residual.size for block in linear.blocks)
     terms, best = [], None
-    for block, scales in BLOCKS.items():
-        shape = law_covariance(coordinates, scales)
+    for name, freedom in FREEDOMS.items():
+        if freedom.in_dust and not linear.undisturbed:
+            continue
+        shape = law_covariance(coordinates, freedom.scales) if freedom.scales else None
         for size in SIZES:
-            drops = Block(
-                linear.residual, linear.covariance + size**2 * shape, linear.tangents, linear.residual * 0
-            )
-            scans = [free_map(block, MAP_SHARE * size) for block in linear.scans]
-            step, information, chi, logdet, weighted = solve_globals([drops, *scans], ["ln_p_m"], {})
-            n = sum(block.residual.size for block in linear.blocks)
+            free = [loosen(Block(linear.residual, linear.covariance, linear.tangents, shape), size)]
+            free += [loosen(block, MAP_SHARE * size * freedom.in_maps) for block in linear.scans]
+            free += [loosen(block, MAP_SHARE * size * freedom.in_dust) for block in linear.undisturbed]
+            step, information, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
             evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
             evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(information[0, 0]) - math.log(high - low)
             terms.append(evidence)
             if best is None or evidence > best[0]:
-                law = size**2 * shape @ weighted[0]
-                best = (
-                    evidence,
-                    block,
-                    size,
-                    law,
-                    fit.log_p_m + float(step[0]),
-                    math.sqrt(information[0, 0]),
-                )
+                law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(linear.residual.size)
+                moved = fit.log_p_m + float(step[0])
+                best = (evidence, name, size, law, moved, math.sqrt(information[0, 0]))
     assert best is not None
     top = max(terms)
     total = top + math.log(sum(math.exp(term - top) for term in terms) / len(terms))
     return UnknownFit(total, *best[1:])
 
 
-def free_map(block: Block, share: float) -> Block:
-    """A scan whose contrast is free within a share of itself, alike in all cells of like contrast."""
-    free = share * block.free
-    scale = max(float(block.free.max()), 1e-12)
-    alike = np.exp(-0.5 * (np.subtract.outer(block.free, block.free) / (0.3 * scale)) ** 2)
-    return Block(block.residual, block.covariance + np.outer(free, free) * alike, block.tangents, block.free)
+def loosen(block: Block, size: float) -> Block:
+    """The block with its free covariance, of this size, among its errors."""
+    if block.free is None or size == 0.0:
+        return block
+    return replace(block, covariance=block.covariance + size**2 * block.free)
 
 
 def law_coordinates(fit: Fit) -> dict[str, FloatArray]:

@@ -12,16 +12,17 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 
-from ..ct.reduce import reduce_scan
+from ..ct.reduce import ReducedScan, reduce_scan
 from ..effects import list_effects
-from ..errors import InferenceError
+from ..errors import InferenceError, MeasurementError
 from ..records import Campaign, FloatArray
 from .fitting import Fit, Workbench, fit_hypothesis, linearise_at, open_workbench
 from .likelihood import Terms
 from .observe import observe_drops
 from .posterior import Posterior, measure_residual, sample
 from .runs import Progress, RunStore
-from .scans import ObservedScan, observe_scan
+from .scans import observe_scan
+from .undisturbed import observe_undisturbed
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,15 @@ class Calibration:
     warnings: tuple[str, ...]
 
 
-def measure_scans(campaign: Campaign) -> list[ObservedScan]:
-    return [observe_scan(reduce_scan(scan)) for scan in campaign.scans]
+def reduce_scans(campaign: Campaign) -> tuple[list[ReducedScan], list[str]]:
+    """All scans that can be reduced, and one line for each that cannot."""
+    reduced, warnings = [], []
+    for scan in campaign.scans:
+        try:
+            reduced.append(reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor))
+        except MeasurementError as error:
+            warnings.append(f"scan {scan.name} left out: {error}")
+    return reduced, warnings
 
 
 def prepare(
@@ -58,7 +66,8 @@ def prepare(
 ) -> tuple[Workbench, Fit]:
     """Measure the campaign, fit the nominal model, estimate the scatter between samples and fit again."""
     drops = observe_drops(campaign)
-    scans = measure_scans(campaign) if use_scans else []
+    reduced, warnings = reduce_scans(campaign)
+    dust = [found for found in map(observe_undisturbed, reduced) if found is not None]
     effects = list_effects(campaign.folder)
     bench = open_workbench(
         campaign,
@@ -69,9 +78,11 @@ def prepare(
         scheduler=scheduler,
         progress=progress,
         drops=drops,
-        scans=scans,
+        scans=[observe_scan(each) for each in reduced] if use_scans else [],
+        undisturbed=dust,
         cells=cells,
     )
+    bench.warnings += warnings
     middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
     return bench, fit_hypothesis(bench, (), (min(middle, math.log(1414.0)), {}))
 
@@ -108,7 +119,7 @@ def calibrate(
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = float(chi2.sf(fit.chi_square, max(fit.points - 1 - len(names) - _free(bench), 1)))
-    warnings = warn_unused_scans(campaign, bench)
+    warnings = warn_unused_scans(bench)
     if p_value < 0.05:
         warnings.append(f"the model does not explain the data (p = {p_value:.2g}); labsim diagnose asks why")
     return Calibration(
@@ -126,12 +137,15 @@ def calibrate(
     )
 
 
-def warn_unused_scans(campaign: Campaign, bench: Workbench) -> list[str]:
-    """One line where scans exist that the likelihood did not use."""
-    if campaign.scans and not bench.scans:
-        names = ", ".join(scan.name for scan in campaign.scans)
-        return [f"scans {names} are not part of the likelihood; labsim ct reduces them"]
-    return []
+def warn_unused_scans(bench: Workbench) -> list[str]:
+    """What was left out of the measurement, one line each."""
+    lines = list(bench.warnings)
+    if bench.undisturbed and not bench.scans:
+        names = ", ".join(dust.name for dust in bench.undisturbed)
+        lines.append(
+            f"of scans {names} only the undisturbed dust and the point spread enter the likelihood, not the compacted zone"
+        )
+    return lines
 
 
 def _free(bench: Workbench) -> int:

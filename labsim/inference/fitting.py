@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -17,14 +18,19 @@ from scipy.linalg import solve_triangular
 from ..effects import Effect, Instrument, Place, list_places
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
+from ..sph import DropRun
+from .blocks import Block
 from .curves import encode_run
 from .forward import ResponseTable
 from .grid import (
+    COARSE_CELLS,
     STRENGTH_ANCHOR,
     STRENGTH_RATIO,
     Change,
     Family,
+    Request,
     RunGrid,
+    few_positions,
     speed_nodes,
 )
 from .likelihood import (
@@ -39,6 +45,7 @@ from .likelihood import (
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
 from .scans import BLUR_PROBE, ObservedScan, ScanModel, encode_scan_run, linearise_scan, update_speed
+from .undisturbed import Seen, UndisturbedDust, linearise_undisturbed
 
 Hypothesis = tuple[str, ...]
 SCAN_MARGIN = 1.06
@@ -64,7 +71,6 @@ class Fit:
     evidence: float
     linear: Linearised
     models: list[DropModel]
-    shapes: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -82,26 +88,46 @@ class Workbench:
     models: list[DropModel]
     reasons: dict[str, str]  # why an effect does not apply
     scans: list[ScanModel] = field(default_factory=list)
+    undisturbed: list[UndisturbedDust] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    shape_evidence: dict[str, float] = field(
+        default_factory=dict
+    )  # ln of what fitting a shape beforehand costs
+    renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
 
-    def _fill(self, number: int, index: int, variant: str, name: str = "", amplitude: float = 0.0) -> None:
-        """Encode the runs of one family and enter them into the tables that rest on them."""
-        runs = self.grid.stopped_runs(variant, index, number)
-        if self.families[number].is_scan:
-            pairs = [
-                (table, [encode_scan_run(run, scan.observed, blur) for run in runs or []])
+    def _encode(
+        self, number: int, index: int, variant: str, cells: int | None
+    ) -> list[tuple[ResponseTable, FloatArray | None]]:
+        """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
+        runs = self.grid.stopped_runs(variant, index, cells, number)
+        tables: list[tuple[ResponseTable, Callable[[DropRun], FloatArray]]]
+        if not self.families[number].is_scan:
+            tables = [(self.tables[number], encode_run)]
+        else:
+            tables = [
+                (table, partial(encode_scan_run, observed=scan.observed, blur=blur))
                 for scan in self.scans
                 for table, blur in ((scan.table, 0.0), (scan.blurred, BLUR_PROBE))
                 if self._scan_family(scan) == number
             ]
-        else:
-            pairs = [(self.tables[number], [encode_run(run) for run in runs or []])]
-        for table, codes in pairs:
-            if name:
-                entry = table.changes.setdefault(name, {}).setdefault(index, {})
-                if runs is not None and index in table.base and amplitude not in entry:
-                    entry[amplitude] = np.array(codes) - table.base[index]
-            elif runs is not None and index not in table.base:
-                table.base[index] = np.array(codes)
+        return [
+            (table, None if runs is None else np.array([encode(run) for run in runs]))
+            for table, encode in tables
+        ]
+
+    def _fill_base(self, number: int, index: int) -> None:
+        for table, codes in self._encode(number, index, "", None):
+            if codes is not None and index not in table.base:
+                table.base[index] = codes
+
+    def _fill_change(self, number: int, index: int, name: str, amplitude: float, cells: int) -> None:
+        before = self._encode(number, index, "", cells)
+        after = self._encode(number, index, self._variant(name, amplitude), cells)
+        for (table, codes), (_, plain) in zip(after, before, strict=True):
+            kept = table.changes if cells >= self.grid.cells else table.fingerprints
+            entry = kept.setdefault(name, {}).setdefault(index, {})
+            if codes is not None and plain is not None and amplitude not in entry:
+                entry[amplitude] = codes - plain
 
     def _scan_family(self, scan: ScanModel) -> int:
         p = scan.observed.scan.projectile
@@ -140,22 +166,28 @@ class Workbench:
                 return place
         return next(iter(self.places.values()))
 
+    def _variant(self, name: str, amplitude: float) -> str:
+        return f"{self.renamed.get(name, name)} {amplitude:.9g}"
+
     def require_base(self, indices: Sequence[int]) -> None:
-        self.grid.require([("", None, index) for index in indices], "nominal model")
+        self.grid.require([Request("", None, index, None) for index in indices], "nominal model")
         for number in range(len(self.families)):
             for index in indices:
-                self._fill(number, index, "")
+                self._fill_base(number, index)
 
-    def require_changes(self, wanted: Sequence[tuple[str, float, int]], text: str = "") -> None:
-        """Runs of (effect, amplitude, strength index) and what they change."""
-        self.require_base(sorted({index for _, _, index in wanted}))
-        self.grid.require(
-            [(f"{name} {a:.9g}", self.change(name, a), index) for name, a, index in wanted],
-            text or "effects",
-        )
+    def require_changes(
+        self, wanted: Sequence[tuple[str, float, int]], text: str = "effects", *, coarse: bool = False
+    ) -> None:
+        """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
+        cells = min(COARSE_CELLS, self.grid.cells) if coarse else self.grid.cells
+        plain = [Request("", None, index, cells) for index in sorted({index for _, _, index in wanted})]
+        changed = [
+            Request(self._variant(name, a), self.change(name, a), index, cells) for name, a, index in wanted
+        ]
+        self.grid.require(plain + changed, text)
         for number in range(len(self.families)):
             for name, amplitude, index in wanted:
-                self._fill(number, index, f"{name} {amplitude:.9g}", name, amplitude)
+                self._fill_change(number, index, name, amplitude, cells)
 
     def instruments(self, amplitudes: Mapping[str, float]) -> dict[str, Instrument]:
         made = {}
@@ -198,6 +230,7 @@ def open_workbench(
     cells: int | None = None,
     drops: list[ObservedDrop] | None = None,
     scans: Sequence[ObservedScan] = (),
+    undisturbed: Sequence[UndisturbedDust] = (),
 ) -> Workbench:
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
     drops = drops if drops is not None else observe_drops(campaign)
@@ -211,23 +244,26 @@ def open_workbench(
     tables, models = [], []
     for group in members.values():
         speeds = [drop.impact_speed for drop in group]
-        nodes = speed_nodes(min(speeds) / SPEED_MARGIN, max(speeds) * SPEED_MARGIN)
+        slowest, fastest = min(speeds) / SPEED_MARGIN, max(speeds) * SPEED_MARGIN
+        nodes = speed_nodes(slowest, fastest)
+        few = few_positions(nodes, slowest, fastest)
         projectile = group[0].drop.projectile
         stated = type(projectile)(projectile.tip, projectile.tip_radius, projectile.mass)
-        families.append(Family(stated, nodes, False))
-        table = ResponseTable(np.log(nodes))
+        families.append(Family(stated, nodes, False, few))
+        table = ResponseTable(np.log(nodes), few)
         tables.append(table)
         models += [make_drop_model(drop, table) for drop in group]
     scan_models = []
     for (tip, radius, mass), group in _group_scans(scans).items():
         speeds = [scan.scan.speed.value for scan in group]
-        nodes = speed_nodes(min(speeds) / SCAN_MARGIN, max(speeds) * SCAN_MARGIN)
-        families.append(Family(Projectile(tip, radius, mass), nodes, True))
+        slowest, fastest = min(speeds) / SCAN_MARGIN, max(speeds) * SCAN_MARGIN
+        nodes = speed_nodes(slowest, fastest)
+        few = few_positions(nodes, slowest, fastest)
+        families.append(Family(Projectile(tip, radius, mass), nodes, True, few))
         for scan in group:
             start = math.log(scan.scan.speed.value)
-            scan_models.append(
-                ScanModel(scan, ResponseTable(np.log(nodes)), ResponseTable(np.log(nodes)), start)
-            )
+            tables_of_scan = [ResponseTable(np.log(nodes), few) for _ in range(2)]
+            scan_models.append(ScanModel(scan, *tables_of_scan, start))
     resolved, reasons = {}, {}
     for name, effect in effects.items():
         reason = effect.applies(campaign)
@@ -251,6 +287,7 @@ def open_workbench(
         models,
         reasons,
         scan_models,
+        list(undisturbed),
     )
 
 
@@ -318,7 +355,7 @@ def fit_hypothesis(
             values[name] = _inside(bench, name, before + float(moved[k + 1]))
             change.append(abs(values[name] - before) / math.sqrt(covariance[k + 1, k + 1]))
         shift = update_nuisances(models, linear, weighted[0])
-        for scan, block, weights in zip(bench.scans, linear.scans, weighted[1:], strict=True):
+        for scan, block, weights in zip(bench.scans, linear.scans, weighted[1:], strict=False):
             shift = max(shift, 0.5 * update_speed(scan, block, weights))
         if max(change) < SETTLED and shift < 0.05 and iteration > 0:
             break
@@ -335,7 +372,9 @@ def fit_hypothesis(
     evidence -= math.log(high - low)
     for name in hypothesis:
         parameter = bench.effects[name].amplitudes[0]
-        evidence += float(parameter.log_prior(parameter.null + values[name]))
+        evidence += float(parameter.log_prior(parameter.null + values[name])) + bench.shape_evidence.get(
+            name, 0.0
+        )
     return Fit(
         hypothesis,
         log_p_m,
@@ -382,7 +421,40 @@ def linearise_at(
         name = scan.observed.name
         seen = {probe: (amps, insts[name], step) for probe, (amps, insts, _offsets, step) in probes.items()}
         blocks.append(linearise_scan(scan, log_p_m, values, instruments[name], bench.terms.scatter, seen))
-    return replace(linear, scans=tuple(blocks))
+    return replace(linear, scans=tuple(blocks), undisturbed=tuple(_linearise_dust(bench, values, probes)))
+
+
+Probes = Mapping[str, tuple[Mapping[str, float], Mapping[str, Instrument], Mapping[str, float], float]]
+
+
+def linearise_dust(bench: Workbench, values: Mapping[str, float], steps: Mapping[str, float]) -> list[Block]:
+    """The undisturbed dust about amplitudes, with tangents by the given steps; empty without scans."""
+    probes = {}
+    for name, step in steps.items():
+        moved = {**values, name: values.get(name, 0.0) + step}
+        probes[name] = (moved, bench.instruments(moved), {}, step)
+    return _linearise_dust(bench, values, probes)
+
+
+def _linearise_dust(bench: Workbench, values: Mapping[str, float], probes: Probes) -> list[Block]:
+    if not bench.undisturbed:
+        return []
+    plain = bench.grid.setting(bench.families[0], bench.families[0].speeds[0], 1000.0)
+
+    def see(amplitudes: Mapping[str, float], instruments: Mapping[str, Instrument]) -> dict[str, Seen]:
+        seen = {}
+        for dust in bench.undisturbed:
+            setting = plain
+            for name, amplitude in amplitudes.items():
+                if amplitude != 0.0:
+                    place = bench.places[dust.name]
+                    setting = bench.effects[name].apply(setting, bench.at(name, amplitude), place)
+            seen[dust.name] = (setting, instruments[dust.name])
+        return seen
+
+    moved = {name: (see(amps, insts), step) for name, (amps, insts, _offsets, step) in probes.items()}
+    sigma = bench.campaign.sample.filling_factor_sigma
+    return [linearise_undisturbed(bench.undisturbed, see(values, bench.instruments(values)), moved, sigma)]
 
 
 def _chi_here(linear: Linearised) -> float:

@@ -20,14 +20,20 @@ from .grid import interpolation_weights, strength_node
 STANDARD_GRAVITY = 9.81
 
 
+Changes = dict[int, dict[float, FloatArray]]
+
+
 @dataclass
 class ResponseTable:
-    """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
-    where the amplitude is the parameter minus its null and the arrays are differences from the base."""
+    """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (few, m)}}}
+    where the amplitude is the parameter minus its null and the arrays are differences from the base at the few speeds.
+    fingerprints : the same from coarser runs, taken where there are no changes."""
 
     log_speeds: FloatArray
+    few: tuple[int, ...]
     base: dict[int, FloatArray] = field(default_factory=dict)
-    changes: dict[str, dict[int, dict[float, FloatArray]]] = field(default_factory=dict)
+    changes: dict[str, Changes] = field(default_factory=dict)
+    fingerprints: dict[str, Changes] = field(default_factory=dict)
 
     def code(self, log_p_m: float, log_speed: float, amplitudes: Mapping[str, float]) -> FloatArray:
         """Interpolated code (m,)."""
@@ -41,13 +47,14 @@ class ResponseTable:
             for index, weight in zip(nearest, interpolation_weights(nodes, log_p_m), strict=True)
         )
         for name, amplitude in amplitudes.items():
-            if amplitude != 0.0 and name in self.changes:
-                code = code + self.change(name, log_p_m, amplitude, across)
+            if amplitude != 0.0 and (name in self.changes or name in self.fingerprints):
+                code = code + self.change(name, log_p_m, amplitude, log_speed)
         return np.asarray(code)
 
-    def change(self, name: str, log_p_m: float, amplitude: float, across: FloatArray) -> FloatArray:
+    def change(self, name: str, log_p_m: float, amplitude: float, log_speed: float) -> FloatArray:
         """What an effect adds to the code, (m,)."""
-        table = self.changes[name]
+        table = self.changes[name] if name in self.changes else self.fingerprints[name]
+        across = interpolation_weights(self.log_speeds[list(self.few)], log_speed)
         available = sorted((index for index in table if table[index]), key=lambda index: strength_node(index))
         nodes = np.array([math.log(strength_node(index)) for index in available])
         values = []

@@ -20,18 +20,37 @@ SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 FEWEST_SPEEDS = 3
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/numerics.md: 0.43 % of the depth left at that
+COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
+SCAN_CHANGE_CELLS = 5  # of what an effect changes in a map
 
 Change = Callable[[DropSetting], DropSetting]
 
 
 @dataclass(frozen=True)
 class Family:
-    """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising."""
+    """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
+
+    few : positions among them at which changes by effects are simulated, smoother in speed than what they change.
+    """
 
     projectile: Projectile
     speeds: tuple[float, ...]
     is_scan: bool
+    few: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Request:
+    """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
+
+    cells : spacings in a tip radius, at the few speeds that changes need; None for the full base at its own spacing.
+    """
+
+    variant: str
+    change: Change | None
+    index: int
+    cells: int | None
 
 
 def speed_nodes(slowest: float, fastest: float) -> tuple[float, ...]:
@@ -45,6 +64,15 @@ def speed_nodes(slowest: float, fastest: float) -> tuple[float, ...]:
         else:
             last += 1
     return tuple(SPEED_ANCHOR * SPEED_RATIO**k for k in range(first, last + 1))
+
+
+def few_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
+    """Two neighbouring nodes where they enclose all speeds, else both ends and the middle."""
+    below = max(int(np.searchsorted(speeds, slowest * (1 + 1e-9))) - 1, 0)
+    above = min(int(np.searchsorted(speeds, fastest * (1 - 1e-9))), len(speeds) - 1)
+    if above - below <= 1:
+        return (below, below + 1) if below + 1 < len(speeds) else (below - 1, below)
+    return tuple(sorted({0, (len(speeds) - 1) // 2 + (len(speeds) % 2 == 0), len(speeds) - 1}))
 
 
 def strength_node(index: int) -> float:
@@ -62,7 +90,7 @@ def interpolation_weights(nodes: FloatArray, at: float) -> FloatArray:
 
 @dataclass
 class RunGrid:
-    """Access to runs by (variant, family, speed, p_m node); a variant is a named change of the setting."""
+    """Access to runs by (variant, p_m node, cells, family), each in the order of its speeds."""
 
     campaign: Campaign
     store: RunStore
@@ -71,10 +99,13 @@ class RunGrid:
     workers: int | None = None
     scheduler: str | None = None
     progress: Progress | None = None
-    runs: dict[tuple[str, int, int], list[DropRun | FailedRun]] = field(default_factory=dict)
+    runs: dict[tuple[str, int, int | None, int], list[DropRun | FailedRun]] = field(default_factory=dict)
 
-    def setting(self, family: Family, speed: float, p_m: float) -> DropSetting:
+    def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
+        own = SCAN_CELLS if family.is_scan else self.cells
+        if cells is not None:
+            own = max(cells, SCAN_CHANGE_CELLS) if family.is_scan else cells
         campaign, radius = self.campaign, family.projectile.tip_radius
         return DropSetting(
             projectile=family.projectile,
@@ -84,37 +115,40 @@ class RunGrid:
             monomer_density=campaign.sample.monomer_density,
             gravity=campaign.gravity,
             geometry=campaign.geometry,
-            spacing=radius / (SCAN_CELLS if family.is_scan else self.cells),
+            spacing=radius / own,
             after_stop=0.16,
         )
 
-    def require(self, wanted: Sequence[tuple[str, Change | None, int]], text: str) -> None:
-        """Make sure the runs of (variant, change, p_m index) are there for every family and speed."""
+    def require(self, wanted: Sequence[Request], text: str) -> None:
+        """Make sure that all runs of these requests are there."""
         missing = [
-            (name, change, index, number)
-            for name, change, index in dict.fromkeys(wanted)
+            (request, number)
+            for request in dict.fromkeys(wanted)
             for number in range(len(self.families))
-            if (name, index, number) not in self.runs
+            if (request.variant, request.index, request.cells, number) not in self.runs
         ]
         settings, places = [], []
-        for name, change, index, number in missing:
+        for request, number in missing:
             family = self.families[number]
-            for speed in family.speeds:
-                setting = self.setting(family, speed, strength_node(index))
-                settings.append(change(setting) if change is not None else setting)
-            places.append((name, index, number, len(family.speeds)))
+            positions = range(len(family.speeds)) if request.cells is None else family.few
+            for position in positions:
+                setting = self.setting(
+                    family, family.speeds[position], strength_node(request.index), request.cells
+                )
+                settings.append(request.change(setting) if request.change is not None else setting)
+            places.append((request, number, len(positions)))
         if not settings:
             return
         runs = self.store.get_many(
             settings, workers=self.workers, scheduler=self.scheduler, progress=self.progress, text=text
         )
         at = 0
-        for name, index, number, count in places:
-            self.runs[name, index, number] = runs[at : at + count]
+        for request, number, count in places:
+            self.runs[request.variant, request.index, request.cells, number] = runs[at : at + count]
             at += count
 
-    def stopped_runs(self, variant: str, index: int, number: int) -> list[DropRun] | None:
+    def stopped_runs(self, variant: str, index: int, cells: int | None, number: int) -> list[DropRun] | None:
         """Runs of one family, in the order of its speeds, or None where one failed or never stopped."""
-        runs = self.runs[variant, index, number]
+        runs = self.runs[variant, index, cells, number]
         good = [run for run in runs if isinstance(run, DropRun) and run.stopped]
         return good if len(good) == len(runs) else None

@@ -20,9 +20,9 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from ..effects import Instrument
 from ..records import FloatArray
+from .blocks import Block
 from .forward import Instant, ResponseTable, predict_depth, predict_speed
 from .observe import STANDARD_GRAVITY, ObservedDrop
-from .scans import Block
 
 BIN = 8  # frames of free fall averaged into one point
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
@@ -78,12 +78,18 @@ class Linearised:
     sections: dict[str, slice]
     local: list[FloatArray]  # per drop, (points, nuisances) scaled by their prior widths
     pulls: list[FloatArray]  # per drop, current nuisances over prior widths
-    scans: tuple[Block, ...] = ()
+    scans: tuple[Block, ...] = ()  # maps
+    undisturbed: tuple[Block, ...] = ()  # dust that no bead reached, all scans in one
 
     @property
     def blocks(self) -> list[Block]:
-        """The independent parts: all drops, then each scan."""
-        return [Block(self.residual, self.covariance, self.tangents, self.residual * 0), *self.scans]
+        """The independent parts: all drops, then each map, then the undisturbed dust."""
+        return [Block(self.residual, self.covariance, self.tangents), *self.further]
+
+    @property
+    def further(self) -> list[Block]:
+        """All parts but the drops."""
+        return [*self.scans, *self.undisturbed]
 
 
 Globals = Mapping[str, float]

@@ -19,6 +19,7 @@ from ..ct.reduce import ReducedScan
 from ..effects import Instrument
 from ..records import FloatArray, Scan
 from ..sph import DropRun
+from .blocks import Block
 from .forward import ResponseTable
 
 GREY = 0.005  # relative, of the grey calibration, where nothing is stated
@@ -81,19 +82,6 @@ def encode_scan_run(run: DropRun, observed: ObservedScan, blur: float = 0.0) -> 
         masked=~observed.cells,
     )
     return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
-
-
-@dataclass(frozen=True)
-class Block:
-    """One independent part of the data about one point. residual : (n,); covariance : (n, n); tangents : name -> (n,)."""
-
-    residual: FloatArray
-    covariance: FloatArray
-    tangents: dict[str, FloatArray]
-    free: FloatArray  # (n,), size of the contrast that an unknown cause may change
-    by_speed: FloatArray | None = (
-        None  # (n,), change with the impact speed, per its stated standard uncertainty
-    )
 
 
 @dataclass
@@ -163,7 +151,10 @@ def linearise_scan(
     for name, (amps, inst, step) in probes.items():
         tangents[name] = (predict(log_p_m, log_speed, amps, inst) - here) / step
     residual = data - here + nuisances[0] * pull  # the speed is zero-mean about what is stated
-    return Block(residual, covariance, tangents, np.append(contrast, 0.0), nuisances[0])
+    # what an unknown cause changes is alike in all cells of like contrast
+    size = np.append(contrast, 0.0)
+    like = np.exp(-0.5 * (np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))) ** 2)
+    return Block(residual, covariance, tangents, np.outer(size, size) * like, nuisances[0])
 
 
 def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:

@@ -78,7 +78,7 @@ def test_prediction_is_continuous_at_contact_and_scales_with_the_instrument():
 def test_effects_add_a_polynomial_that_vanishes_at_null():
     speeds = np.log([0.2, 0.3, 0.4])
     base = np.stack([sine_code(stop=2e-3 + k * 1e-4) for k in range(3)])
-    table = ResponseTable(speeds, {0: base, 1: base - 0.2})
+    table = ResponseTable(speeds, (0, 1, 2), {0: base, 1: base - 0.2})
     table.changes["e"] = {0: {1.0: 0.1 * np.ones_like(base), 2.0: 0.4 * np.ones_like(base)}}
     plain = table.code(math.log(1200.0), speeds[1], {})
     assert table.code(math.log(1200.0), speeds[1], {"e": 0.0}) == pytest.approx(plain, abs=0)

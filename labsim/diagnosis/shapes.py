@@ -1,0 +1,161 @@
+"""Shape parameters of effects: numbers that do not matter while the amplitude is null, such as the length of a crust.
+
+Where undisturbed dust in the scans shows the shape, it is taken from there before anything is simulated. Otherwise the effect
+is tried at three quantiles of the shape's prior, as three variants of one cause: their evidences are averaged, and the best of
+them stands for the cause.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..effects import Effect, Parameter
+from ..inference.fitting import Fit, Workbench, linearise_dust
+from ..inference.likelihood import solve_globals
+from .screen import Screening
+
+QUANTILES = (1 / 6, 5 / 6)  # with the stated value, the thirds of the prior
+CLEAR = 16.0  # drop of χ² from which undisturbed dust decides a shape
+MARK = "@"
+
+
+def shape_parameter(effect: Effect) -> Parameter | None:
+    return next((parameter for parameter in effect.parameters if parameter.shape), None)
+
+
+def with_shape(effect: Effect, value: float) -> Effect:
+    """The effect with another default of its (first) shape parameter."""
+    chosen = shape_parameter(effect)
+    parameters = tuple(replace(p, null=value) if p is chosen else p for p in effect.parameters)
+    return replace(effect, parameters=parameters)
+
+
+def lay_out_shapes(bench: Workbench) -> None:
+    """Settle shapes from the undisturbed dust, add variants of the others to the workbench's effects."""
+    for name, effect in list(bench.effects.items()):
+        parameter = shape_parameter(effect)
+        if parameter is None or not effect.amplitudes:
+            continue
+        if _shows_in_dust(bench, name):
+            _settle(bench, name, parameter)
+            continue
+        low, high = (float(parameter.prior.cdf(limit)) for limit in parameter.limits)
+        for quantile in QUANTILES:
+            value = float(f"{float(parameter.prior.ppf(low + (high - low) * quantile)):.2g}")
+            bench.effects[f"{name}{MARK}{value:g}"] = with_shape(effect, value)
+
+
+def cause(name: str) -> str:
+    """The name of the cause that a variant stands for."""
+    return name.split(MARK)[0]
+
+
+def _shows_in_dust(bench: Workbench, name: str) -> bool:
+    blocks = linearise_dust(bench, {}, {name: bench.effects[name].amplitudes[0].step})
+    return any(bool(np.any(block.tangents[name] != 0.0)) for block in blocks)
+
+
+def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
+    """Best shape by the undisturbed dust alone, with its amplitude free; its prior's price goes to shape_evidence."""
+    effect = bench.effects[name]
+    width = effect.amplitudes[0].scale
+
+    def cost(log_shape: float) -> float:
+        bench.effects[name] = with_shape(effect, math.exp(log_shape))
+        block = linearise_dust(bench, {}, {name: 0.05 * effect.amplitudes[0].step})[0]
+        _step, _cov, chi, _det, _w = solve_globals([block], [name], {name: (0.0, width)})
+        return chi - 2 * float(parameter.log_prior(math.exp(log_shape)))
+
+    block = linearise_dust(bench, {}, {})[0]
+    plain = float(block.residual @ np.linalg.solve(block.covariance, block.residual))
+    low, high = (math.log(max(limit, 1e-12)) for limit in parameter.limits)
+    grid = np.linspace(low, high, 25)[1:-1]
+    values = [cost(x) for x in grid]
+    k = int(np.argmin(values))
+    best = minimize_scalar(
+        cost, bounds=(grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]), method="bounded"
+    )
+    drop = plain - (best.fun + 2 * float(parameter.log_prior(math.exp(best.x))))
+    if drop < CLEAR:
+        bench.effects[name] = effect
+        return
+    step = 0.02
+    curvature = (cost(best.x + step) + cost(best.x - step) - 2 * best.fun) / step**2 / 2
+    sigma = math.exp(best.x) / math.sqrt(max(curvature, 1.0))
+    price = float(parameter.log_prior(math.exp(best.x))) + 0.5 * math.log(2 * math.pi) + math.log(sigma)
+    bench.effects[name] = with_shape(effect, float(f"{math.exp(best.x):.3g}"))
+    bench.shape_evidence[name] = min(price, 0.0)
+
+
+def merge_variants(
+    bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening
+) -> tuple[list[Fit], Screening]:
+    """One fit and one score per cause. The best variant takes the cause's name in the workbench; evidences are averaged."""
+    fitted = {fit.hypothesis[0]: fit for fit in fits}
+    scores = {score.name: score for score in screening.scores}
+    groups: dict[str, list[str]] = {}
+    for name in scores:
+        groups.setdefault(cause(name), []).append(name)
+    merged, kept = [], []
+    for base, variants in groups.items():
+        evidence = {
+            name: fitted[name].evidence if name in fitted else nominal.evidence + scores[name].log_bayes
+            for name in variants
+        }
+        top = max(evidence.values())
+        mean = top + math.log(sum(math.exp(e - top) for e in evidence.values()) / len(variants))
+        candidates = [name for name in variants if name in fitted] or variants
+        best = max(candidates, key=lambda name: evidence[name])
+        kept.append((best, base, mean - nominal.evidence))
+        if best != base:
+            _take_name(bench, best, base)
+        if best in fitted:
+            merged.append(replace(_rename(fitted[best], best, base), evidence=mean))
+        for name in variants:
+            if name != base:
+                bench.effects.pop(name, None)
+    chosen = {best: (base, log_bayes) for best, base, log_bayes in kept}
+    positions = [k for k, name in enumerate(screening.names) if name in chosen]
+    return merged, replace(
+        screening,
+        scores=sorted(
+            (
+                replace(scores[best], name=base, log_bayes=log_bayes)
+                for best, (base, log_bayes) in chosen.items()
+            ),
+            key=lambda score: -score.log_bayes,
+        ),
+        names=[chosen[screening.names[k]][0] for k in positions],
+        cosines=screening.cosines[np.ix_(positions, positions)],
+        fingerprints=screening.fingerprints[:, positions],
+    )
+
+
+def _take_name(bench: Workbench, variant: str, base: str) -> None:
+    bench.effects[base] = bench.effects[variant]
+    for table in [*bench.tables, *(t for scan in bench.scans for t in (scan.table, scan.blurred))]:
+        for kept in (table.changes, table.fingerprints):
+            kept.pop(base, None)
+            if variant in kept:
+                kept[base] = kept.pop(variant)
+    bench.renamed[base] = variant
+
+
+def _rename(fit: Fit, before: str, after: str) -> Fit:
+    def rename(table: Mapping) -> dict:
+        return {after if key == before else key: value for key, value in table.items()}
+
+    linear = replace(
+        fit.linear,
+        tangents=rename(fit.linear.tangents),
+        scans=tuple(replace(block, tangents=rename(block.tangents)) for block in fit.linear.scans),
+        undisturbed=tuple(
+            replace(block, tangents=rename(block.tangents)) for block in fit.linear.undisturbed
+        ),
+    )
+    return replace(fit, hypothesis=(after,), values=rename(fit.values), linear=linear)

@@ -1,0 +1,113 @@
+"""What CT scans say without any simulation: the filling factor of the dust that the bead did not reach, against depth, and how
+sharp its edge is seen.
+
+The nominal model states both: φ0 at all depths, and a point spread of one voxel. Effects of the sample (crust, gradient,
+another φ0) and of the CT (grey scale, blur) change what is expected here through the same functions that change their runs.
+Errors: each row's own, what cupping and the bead's elastic strain leave (SMOOTH), the stated uncertainty of φ0 and of the grey
+calibration (GREY), both common to all scans; for the point spread POINT_SPREAD_SIGMA, partly common.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..ct.reduce import ReducedScan
+from ..effects import Instrument
+from ..records import FloatArray, Scan
+from ..sph import DropSetting
+from ..sph.particles import initial_filling_factor
+from .blocks import Block
+
+REACH = 3.0  # tip radii about the bead and its path within which dust may have moved
+SMOOTH, SMOOTH_LENGTH = 3e-4, 3e-4  # of the filling factor; m
+GREY = 0.005  # relative, of the grey calibration, where nothing is stated
+POINT_SPREAD_VOXELS = 1.0  # standard deviation that is assumed where nothing is stated
+POINT_SPREAD_SIGMA = (0.12, 0.12)  # of its logarithm: each scan's own, common to all
+FREE_LENGTH = 5e-4  # m, over which an unnamed layer changes
+
+
+@dataclass(frozen=True)
+class UndisturbedDust:
+    """One scan away from its bead. depth (m, positive downwards), filling_factor, sigma : (n,); point_spread : m, measured."""
+
+    scan: Scan
+    depth: FloatArray
+    filling_factor: FloatArray
+    sigma: FloatArray
+    point_spread: float
+
+    @property
+    def name(self) -> str:
+        return self.scan.name
+
+
+def observe_undisturbed(reduced: ReducedScan) -> UndisturbedDust | None:
+    """Rows of a reduced map averaged over the dust that was not reached; None where fewer than four rows are left."""
+    found, radius = reduced.map, reduced.scan.projectile.tip_radius
+    r, z = np.meshgrid(found.r, found.z)
+    centre = reduced.bead_centre_z
+    apart = np.where(z > centre, r, np.hypot(r, z - centre))
+    spread = reduced.blur if math.isfinite(reduced.blur) else reduced.scan.voxel
+    edge = 2.5 * max(spread, reduced.scan.voxel) + reduced.scan.voxel
+    good = (apart > REACH * radius) & (z < -edge) & ~reduced.masked
+    good &= np.isfinite(found.filling_factor) & np.isfinite(found.sigma) & (found.sigma > 0)
+    depth, level, sigma = [], [], []
+    inflate = math.sqrt(
+        (1 + max(reduced.errors.correlation_r, 0.0)) / (1 - min(reduced.errors.correlation_r, 0.9))
+    )
+    for k in np.nonzero(good.sum(axis=1) >= 2)[0]:
+        weight = 1 / found.sigma[k, good[k]] ** 2
+        depth.append(-found.z[k])
+        level.append(float(np.sum(weight * found.filling_factor[k, good[k]]) / weight.sum()))
+        sigma.append(inflate / math.sqrt(weight.sum()))
+    if len(depth) < 4:
+        return None
+    return UndisturbedDust(reduced.scan, np.array(depth), np.array(level), np.array(sigma), reduced.blur)
+
+
+Seen = tuple[DropSetting, Instrument]
+
+
+def linearise_undisturbed(
+    dust: Sequence[UndisturbedDust],
+    nominal: Mapping[str, Seen],
+    probes: Mapping[str, tuple[Mapping[str, Seen], float]],
+    filling_factor_sigma: float,
+) -> Block:
+    """All scans as one independent part of the data.
+
+    nominal : name of scan -> setting (its initial state counts) and instrument of the current point; probes : name of global ->
+    (the same after a step, step). filling_factor_sigma : stated, of the sample.
+    """
+    data = np.concatenate([np.append(each.filling_factor, math.log(each.point_spread)) for each in dust])
+    here = _expect(dust, nominal)
+    row = np.concatenate([np.append(np.ones(each.depth.size), 0.0) for each in dust])
+    own = np.concatenate([np.full(each.depth.size + 1, k) for k, each in enumerate(dust)])
+    depth = np.concatenate([np.append(each.depth, 0.0) for each in dust])
+    sigma = np.concatenate([np.append(each.sigma, POINT_SPREAD_SIGMA[0]) for each in dust])
+    spread = 1.0 - row
+    same = np.equal.outer(own, own) * np.outer(row, row)
+    apart = np.subtract.outer(depth, depth)
+    covariance = np.diag(sigma**2) + SMOOTH**2 * same * np.exp(-0.5 * (apart / SMOOTH_LENGTH) ** 2)
+    level = row * math.hypot(filling_factor_sigma, GREY * float(np.mean(data[row > 0])))
+    covariance += np.outer(level, level) + POINT_SPREAD_SIGMA[1] ** 2 * np.outer(spread, spread)
+    tangents = {"ln_p_m": np.zeros(data.size)}
+    for name, (seen, step) in probes.items():
+        tangents[name] = (_expect(dust, seen) - here) / step
+    # an unnamed layering is the same in all samples, and grows with nothing but depth
+    free = np.outer(row * here, row * here) * np.exp(-0.5 * (apart / FREE_LENGTH) ** 2)
+    return Block(data - here, covariance, tangents, free)
+
+
+def _expect(dust: Sequence[UndisturbedDust], seen: Mapping[str, Seen]) -> FloatArray:
+    parts = []
+    for each in dust:
+        setting, instrument = seen[each.name]
+        level = instrument.stated_filling_factor(initial_filling_factor(setting, each.depth))
+        spread = math.hypot(POINT_SPREAD_VOXELS * each.scan.voxel, instrument.ct_blur)
+        parts.append(np.append(level, math.log(spread)))
+    return np.concatenate(parts)
