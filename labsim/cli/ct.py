@@ -1,34 +1,54 @@
-"""``labsim ct SCAN``: slices to the filling-factor map, its compacted volume and their pictures."""
+"""``labsim ct SCAN``: slices to the filling-factor map, its compacted volume and their pictures; of a campaign, all scans."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..errors import CampaignError
+from ..records import Campaign, Scan
+from . import options
+from ._many import Item, finish_many, measure_many
 from .options import AsJson, Out, Quiet, finish, make_output_folder, show_progress, write_json
 
 
 def ct(
-    scan: Annotated[Path, typer.Argument(help="Folder of one scan, with its scan.toml.")],
+    scan: Annotated[
+        Path, typer.Argument(help="Folder of one scan, with its scan.toml, or a whole campaign.")
+    ],
     out: Out = None,
     cell: Annotated[int, typer.Option("--cell", min=1, max=20, help="Voxels along an edge of a cell.")] = 2,
     guard: Annotated[
         float, typer.Option("--guard", min=0, help="Voxels about the bead that are left out.")
     ] = 3.0,
+    workers: options.Workers = None,
+    scheduler: options.Scheduler = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """Reduce a CT scan: slices to an axisymmetric map of the filling factor and its compacted volume."""
     from ..campaign import read_campaign, read_scan
-    from ..ct import compress, reduce_scan, summarise_scan, write_compressed, write_map
-    from ..records import Scan
-    from ..report.map_figures import draw_compressed, draw_map
 
-    began = time.perf_counter()
+    if (scan / "campaign.toml").is_file():
+        read = read_campaign(scan)
+        given = {"cell": cell, "guard": guard, "sample": read.sample.filling_factor}
+        items = [Item(each.name, scan / "ct" / each.name, given) for each in _list_scans(read)]
+        target = make_output_folder(out, scan, "ct")
+        with show_progress(quiet) as progress:
+            found = measure_many(
+                reduce_one,
+                "scan.json",
+                items,
+                target,
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+            )
+        finish_many(found, target / "scans.json", _describe_shortly, as_json=as_json, quiet=quiet)
+        return
     record = read_scan(scan)
     if not isinstance(record, Scan):
         raise CampaignError(
@@ -37,24 +57,57 @@ def ct(
     folder = scan.resolve() if scan.is_dir() else scan.resolve().parent
     campaign = folder.parent.parent
     sample = read_campaign(campaign).sample.filling_factor if (campaign / "campaign.toml").is_file() else None
+    target = make_output_folder(out, scan, "ct")
     with show_progress(quiet) as progress:
-        reduced = reduce_scan(
-            record, cell=cell, guard=guard, sample_filling_factor=sample,
-            progress=lambda done, total, text: progress(done, total, text),
-        )  # fmt: skip
+        summary, lines = reduce_one(scan, target, {"cell": cell, "guard": guard, "sample": sample}, progress)
+    finish({**summary, "out": str(target)}, f"{lines}\nwritten to {target}", as_json=as_json, quiet=quiet)
+
+
+def reduce_one(
+    source: Path, target: Path, given: dict[str, Any], progress: options.Progress | None = None
+) -> tuple[dict[str, Any], str]:
+    """Files of one scan; its summary and the lines for people."""
+    from ..campaign import read_scan
+    from ..ct import compress, reduce_scan, summarise_scan, write_compressed, write_map
+    from ..report.map_figures import draw_compressed, draw_map
+
+    began = time.perf_counter()
+    record = read_scan(source)
+    assert isinstance(record, Scan)
+    reduced = reduce_scan(
+        record,
+        cell=given["cell"],
+        guard=given["guard"],
+        sample_filling_factor=given["sample"],
+        progress=progress or (lambda done, total, text: None),
+    )
     curve = compress(reduced.map)
     summary = summarise_scan(reduced, curve)
     summary["wall_s"] = time.perf_counter() - began
-    target = make_output_folder(out, scan, "ct")
     write_map(reduced, target / "map.nc")
     write_compressed(curve, target / "compressed_volume.csv")
     draw_map(reduced.map, reduced.undisturbed.value, target / "map.png", record.name)
     draw_compressed(curve, target / "compressed_volume.png", record.name)
     write_json(target / "scan.json", summary)
-    finish({**summary, "out": str(target)}, describe(summary, target), as_json=as_json, quiet=quiet)
+    return summary, describe(summary)
 
 
-def describe(summary: dict, target: Path) -> str:
+def _list_scans(campaign: Campaign) -> tuple[Scan, ...]:
+    if not campaign.scans:
+        raise CampaignError(
+            campaign.folder / "ct", "", "holds no scan with slices; there is nothing to reduce"
+        )
+    return campaign.scans
+
+
+def _describe_shortly(name: str, summary: dict) -> str:
+    return (
+        f"{name}: tip {summary['tip_depth_m'] * 1e3:.3f} mm deep, undisturbed {summary['filling_factor_undisturbed']:.4f}, "
+        f"denser than 0.20: {summary['compacted_volume_sphere_volumes']:.2f} sphere volumes"
+    )
+
+
+def describe(summary: dict) -> str:
     """What a person reads at the end."""
     x, y = summary["axis_px"]
     sphere = summary["normalisation"]["sphere_volume_m3"]
@@ -74,4 +127,4 @@ def describe(summary: dict, target: Path) -> str:
         f"heaped {ledger['heaped'] * 1e9:.3f}",
     ]
     lines += [f"note: {text}" for text in summary["warnings"]]
-    return "\n".join([*lines, f"written to {target}"])
+    return "\n".join(lines)

@@ -63,13 +63,14 @@ def make_output_folder(out: Path | None, source: Path, command: str) -> Path:
     return out
 
 
-def write_json(path: Path, summary: dict[str, Any]) -> Path:
+def write_json(path: Path, summary: dict[str, Any], item: str | None = None) -> Path:
     """Write a summary file; a number that is not finite becomes null, and a killed command leaves no half file.
 
-    The summary gets ``made_by``: command, versions, solver, inputs and seed, which ``labsim rerun`` goes by.
+    The summary gets ``made_by``: command, versions, solver, inputs and seed, which ``labsim rerun`` goes by;
+    ``item`` names the input of one measurement of many.
     """
-    if (made_by := _provenance.describe()) is not None:
-        summary[_provenance.KEY] = made_by
+    if (made_by := _provenance.describe()) is not None or item is not None:
+        summary[_provenance.KEY] = {**(made_by or {}), **({"item": item} if item else {})}
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     aside.write_text(json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     os.replace(aside, path)

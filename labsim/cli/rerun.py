@@ -13,7 +13,15 @@ from ..errors import LabsimError
 from . import _provenance, options
 from ._compare import Comparison, compare_folders
 
-SUMMARIES = ("diagnosis.json", "calibration.json", "run.json", "drop.json", "scan.json")
+SUMMARIES = (
+    "diagnosis.json",
+    "calibration.json",
+    "run.json",
+    "drop.json",
+    "scan.json",
+    "tracks.json",
+    "scans.json",
+)
 DIFFERENT = 1  # exit status
 
 

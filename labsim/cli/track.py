@@ -11,11 +11,12 @@ import pandas as pd
 import typer
 
 from .. import video
-from ..campaign import read_drop
+from ..campaign import read_campaign, read_drop
 from ..errors import LabsimError, MeasurementError
 from ..records import Camera, DecelerationCurve, Drop, Measured, Track
 from ..tracks import find_format
 from . import options
+from ._many import Item, finish_many, measure_many
 
 
 @dataclass
@@ -69,51 +70,98 @@ def track(
     part: Annotated[
         str | None, typer.Option("--frames", help="FIRST-LAST: use only these pictures of the video.")
     ] = None,
+    workers: options.Workers = None,
+    scheduler: options.Scheduler = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:
     """Follow the projectile and measure contact, impact speed, depth and stopping time."""
-    request = _read_request(drop, fps, pixel_um, surface_row, surface_row_sigma, row_sigma)
-    if ruler is not None:
-        _take_ruler(request, ruler, 1e-3 * ruler_step_mm)
+    given = {
+        "fps": fps,
+        "pixel_um": pixel_um,
+        "rod_diameter_mm": rod_diameter_mm,
+        "ruler": ruler,
+        "ruler_step_mm": ruler_step_mm,
+        "surface_row": surface_row,
+        "surface_row_sigma": surface_row_sigma,
+        "row_sigma": row_sigma,
+        "rotate": rotate,
+        "part": part,
+    }
+    if (drop / "campaign.toml").is_file():
+        if ruler is not None:
+            raise LabsimError("command line", "--ruler", "belongs to one drop; name its folder")
+        items = [
+            Item(each.name, drop / "drops" / each.name, given)
+            for each in read_campaign(drop).drops
+            if each.record.kind != "summary"
+        ]
+        if not items:
+            raise LabsimError(drop, "record.kind", "is summary in every drop: there is nothing to track")
+        folder = options.make_output_folder(out, drop, "track")
+        with options.show_progress(quiet) as progress:
+            found = measure_many(
+                track_one, "drop.json", items, folder, workers=workers, scheduler=scheduler, progress=progress
+            )
+        finish_many(found, folder / "tracks.json", _tell_shortly, as_json=as_json, quiet=quiet)
+        return
+    _read_request(drop, given)  # before a folder is made
     folder = options.make_output_folder(out, drop, "track")
+    with options.show_progress(quiet) as progress:
+        summary, lines = track_one(drop, folder, given, progress)
+    options.finish(summary, lines, as_json=as_json, quiet=quiet)
+
+
+def track_one(
+    source: Path, folder: Path, given: dict[str, Any], progress: options.Progress | None = None
+) -> tuple[dict[str, Any], str]:
+    """Files of one drop; its summary and the lines for people."""
+    request = _read_request(source, given)
+    if given["ruler"] is not None:
+        _take_ruler(request, given["ruler"], 1e-3 * given["ruler_step_mm"])
     seen: video.Tracking | None = None
     frames: video.Frames | None = None
-    if _is_track_file(request.source):
+    if request.source.is_file() and request.source.suffix.lower() in {".csv", ".txt"}:
         rate = _need(request.fps, request.source, "--fps", "give the frame rate with --fps")
         row = request.surface.value if request.surface else float("nan")
-        pixel = request.pixel_size.value if request.pixel_size else float("nan")
-        found = video.read_track(request.source, Camera(rate, pixel, row, 0.0), request.row_sigma)
+        found = video.read_track(request.source, Camera(rate, 1.0, row, 0.0), request.row_sigma)
     else:
-        frames = video.open_frames(request.source).turned(rotate)
-        if part is not None:
-            frames = frames.section(*_read_range(part))
-        with options.show_progress(quiet) as progress:
-            seen = video.follow_projectile(
-                frames,
-                frame_rate=request.fps,
-                surface_row=request.surface.value if request.surface else None,
-                progress=progress,
-            )
+        frames = video.open_frames(request.source).turned(given["rotate"])
+        if given["part"] is not None:
+            frames = frames.section(*_read_range(given["part"]))
+        seen = video.follow_projectile(
+            frames,
+            frame_rate=request.fps,
+            surface_row=request.surface.value if request.surface else None,
+            progress=progress,
+        )
         found = seen.track
-        _take_from_video(request, seen, rod_diameter_mm)
+        _take_from_video(request, seen, given["rod_diameter_mm"])
     curve = _fit(request, found)
     written = _write(folder, request, found, curve, frames, seen)
     summary = _summarise(request, found, curve, seen)
     options.write_json(folder / "drop.json", summary)
-    options.finish(
-        summary, _tell(summary, curve, folder, [*written, "drop.json"]), as_json=as_json, quiet=quiet
+    return summary, _tell(summary, curve, folder, [*written, "drop.json"])
+
+
+def _tell_shortly(name: str, summary: dict[str, Any]) -> str:
+    def pair(key: str, factor: float, unit: str) -> str:
+        value, sigma = summary.get(key), summary.get(f"{key}_sigma")
+        return (
+            "unknown"
+            if value is None or sigma is None
+            else f"{factor * value:.4f} ± {factor * sigma:.4f} {unit}"
+        )
+
+    return (
+        f"{name}: {pair('impact_speed_m_s', 1.0, 'm/s')}, depth {pair('penetration_depth_m', 1e3, 'mm')}, "
+        f"stop {pair('stopping_time_s', 1e3, 'ms')}, {len(summary['warnings'])} warnings"
     )
 
 
-def _read_request(
-    path: Path,
-    fps: float | None,
-    pixel_um: float | None,
-    surface_row: float | None,
-    surface_row_sigma: float,
-    row_sigma: float | None,
-) -> Request:
+def _read_request(path: Path, given: dict[str, Any]) -> Request:
+    fps, pixel_um, row_sigma = given["fps"], given["pixel_um"], given["row_sigma"]
+    surface_row, surface_row_sigma = given["surface_row"], given["surface_row_sigma"]
     if not path.exists():
         raise LabsimError(path, "DROP", "does not exist; name a drop folder, a video or a track.csv")
     for key, value in (("--fps", fps), ("--pixel-um", pixel_um), ("--row-sigma", row_sigma)):

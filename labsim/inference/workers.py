@@ -61,7 +61,9 @@ def is_loss(trouble: BaseException) -> bool:
 
 
 @contextmanager
-def open_executor(workers: int | None, scheduler: str | None, wanted: int) -> Iterator[tuple[Executor, int]]:
+def open_executor(
+    workers: int | None, scheduler: str | None, wanted: int, *, compile_first: bool = True
+) -> Iterator[tuple[Executor, int]]:
     """An executor and how many runs it takes at once. Raises InferenceError where a scheduler does not answer."""
     if scheduler is not None:
         with _open_dask(scheduler) as pair:
@@ -71,7 +73,8 @@ def open_executor(workers: int | None, scheduler: str | None, wanted: int) -> It
     if count <= 1:
         yield InProcess(), 1
         return
-    warm_up()  # compile once here, or every worker would
+    if compile_first:
+        warm_up()  # once here, or every worker would
     pool = ProcessPoolExecutor(
         max_workers=count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker
     )
