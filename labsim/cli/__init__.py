@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import keyword
+import os
 import pkgutil
 import sys
 from collections.abc import Sequence
@@ -22,6 +23,10 @@ from ..errors import LabsimError
 from . import _provenance
 
 NOT_COMMANDS = {"options", "measured"}  # shared by commands
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+for _name in THREADS:  # before numpy: the same sums on every machine, and no threads that fight the workers
+    os.environ.setdefault(_name, "1")
+
 STOPPED = 130  # what shells say of a command that was interrupted
 
 

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
 from ..inference.fitting import Fit, Hypothesis, Workbench, fit_hypothesis
+from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..records import Campaign
@@ -63,6 +64,7 @@ def diagnose_campaign(
     progress: Progress | None = None,
     use_scans: bool = False,
     cells: int | None = None,
+    measurements: Measurements | None = None,
 ) -> Diagnosis:
     """Measure, calibrate, screen, confirm, judge. Raises LabsimError subclasses as its parts do."""
     began = time.perf_counter()
@@ -75,6 +77,7 @@ def diagnose_campaign(
         progress=progress,
         use_scans=use_scans,
         cells=cells,
+        measurements=measurements,
     )
     lay_out_shapes(bench)
     screening = screen(bench, nominal, random)

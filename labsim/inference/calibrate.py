@@ -12,17 +12,15 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 
-from ..ct.reduce import ReducedScan, reduce_scan
 from ..effects import list_effects
-from ..errors import InferenceError, MeasurementError
+from ..errors import InferenceError
 from ..records import Campaign, FloatArray
 from .fitting import Fit, Workbench, fit_hypothesis, linearise_at, open_workbench
 from .likelihood import Terms
-from .observe import observe_drops
+from .measure import Measurements, measure
 from .posterior import Posterior, measure_residual, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
-from .undisturbed import observe_undisturbed
 
 
 @dataclass(frozen=True)
@@ -42,17 +40,6 @@ class Calibration:
     warnings: tuple[str, ...]
 
 
-def reduce_scans(campaign: Campaign) -> tuple[list[ReducedScan], list[str]]:
-    """All scans that can be reduced, and one line for each that cannot."""
-    reduced, warnings = [], []
-    for scan in campaign.scans:
-        try:
-            reduced.append(reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor))
-        except MeasurementError as error:
-            warnings.append(f"scan {scan.name} left out: {error}")
-    return reduced, warnings
-
-
 def prepare(
     campaign: Campaign,
     store: RunStore,
@@ -63,11 +50,10 @@ def prepare(
     progress: Progress | None = None,
     use_scans: bool = False,
     cells: int | None = None,
+    measurements: Measurements | None = None,
 ) -> tuple[Workbench, Fit]:
-    """Measure the campaign, fit the nominal model, estimate the scatter between samples and fit again."""
-    drops = observe_drops(campaign)
-    reduced, warnings = reduce_scans(campaign)
-    dust = [found for found in map(observe_undisturbed, reduced) if found is not None]
+    """Measure the campaign (where that has not been done) and fit the nominal model."""
+    seen = measurements or measure(campaign)
     effects = list_effects(campaign.folder)
     bench = open_workbench(
         campaign,
@@ -77,12 +63,12 @@ def prepare(
         workers=workers,
         scheduler=scheduler,
         progress=progress,
-        drops=drops,
-        scans=[observe_scan(each) for each in reduced] if use_scans else [],
-        undisturbed=dust,
+        drops=seen.drops,
+        scans=[observe_scan(each) for each in seen.reduced] if use_scans else [],
+        undisturbed=seen.dust,
         cells=cells,
     )
-    bench.warnings += warnings
+    bench.warnings += seen.warnings
     middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
     return bench, fit_hypothesis(bench, (), (min(middle, math.log(1414.0)), {}))
 

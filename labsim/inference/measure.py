@@ -1,0 +1,42 @@
+"""Everything a campaign's files say, reduced once: tracks with their errors, maps, undisturbed dust."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..ct.reduce import ReducedScan, reduce_scan
+from ..errors import MeasurementError
+from ..records import Campaign
+from .observe import ObservedDrop, observe_drops
+from .undisturbed import UndisturbedDust, observe_undisturbed
+
+
+@dataclass
+class Measurements:
+    """drops to be compared; reduced scans; dust : their undisturbed part; warnings : what had to be left out."""
+
+    drops: list[ObservedDrop]
+    reduced: list[ReducedScan] = field(default_factory=list)
+    dust: list[UndisturbedDust] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+def measure(campaign: Campaign) -> Measurements:
+    """Read tracks, track videos, reduce scans. A scan that cannot be reduced is left out with a warning.
+
+    Raises MeasurementError for a drop that shows nothing.
+    """
+    seen = Measurements(observe_drops(campaign))
+    for scan in campaign.scans:
+        try:
+            reduced = reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor)
+        except MeasurementError as error:
+            seen.warnings.append(f"scan {scan.name} left out: {error}")
+            continue
+        seen.reduced.append(reduced)
+        dust = observe_undisturbed(reduced)
+        if dust is None:
+            seen.warnings.append(f"scan {scan.name}: too little dust beyond the reach of the bead")
+        else:
+            seen.dust.append(dust)
+    return seen
