@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..diagnosis.campaign import Diagnosis, diagnose_campaign
 from ..diagnosis.next_experiment import suggest
 from ..effects import list_effects
 from ..effects.model import write_model
 from ..inference.calibrate import Calibration, calibrate
+from ..inference.fitting import Fit
 from ..inference.runs import RunStore
 from ..records import Campaign
 from . import options
+
+if TYPE_CHECKING:  # matplotlib is slow to import and only needed at the end
+    from ..report.drop_views import DropView
+    from ..report.map_views import MapView
 
 
 def has_tracks(campaign: Campaign) -> bool:
@@ -28,17 +34,23 @@ def calibrate_measured(
 
 
 def write_measured_calibration(found: Calibration, folder: Path) -> tuple[dict, str]:
-    from ..report.campaign_figures import draw_drops, draw_maps, draw_posterior
-    from ..report.campaign_tables import campaign_calibration_lines, campaign_calibration_summary
+    from ..report import campaign_figures as figures
+    from ..report.campaign_page import write_calibration_page
+    from ..report.campaign_tables import (
+        campaign_calibration_lines,
+        campaign_calibration_summary,
+        state_numerical_error,
+    )
 
     summary = campaign_calibration_summary(found)
     options.write_json(folder / "calibration.json", summary)
     (folder / "posterior.nc").unlink(missing_ok=True)
     found.posterior.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
-    draw_posterior(found.posterior, folder / "corner.png")
-    draw_drops(found.bench, [("calibrated", found.fit)], folder / "fit.png")
-    if found.bench.scans:
-        draw_maps(found.bench, [("calibrated", found.fit)], folder / "maps.png")
+    figures.draw_posterior(found.posterior, folder / "corner.png")
+    views, maps = _draw_fits(found, [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)], folder)
+    shutil.copyfile(folder / "drops.png", folder / "fit.png")
+    figures.draw_p_m([("calibrated", found.posterior)], folder / "posterior.png")
+    write_calibration_page(found, summary, state_numerical_error(found.bench), views, maps, folder)
     return summary, campaign_calibration_lines(found)
 
 
@@ -62,13 +74,33 @@ def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]
     (folder / "posterior.nc").unlink(missing_ok=True)
     found.posterior_extended.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
     fits = [("nominal", found.nominal)]
+    posteriors = [("nominal", found.posterior_nominal)]
     if found.best is not found.nominal:
         fits.append((" + ".join(found.best.hypothesis), found.best))
-    figures.draw_drops(found.bench, fits, folder / "drops.png")
-    if found.bench.scans:
-        figures.draw_maps(found.bench, fits, folder / "maps.png")
+        posteriors.append((fits[1][0], found.posterior_extended))
+    views, maps = _draw_fits(found, fits, folder)
     figures.draw_causes(found, folder / "causes.png")
-    figures.draw_held_out(found, folder / "held_out.png")
+    figures.draw_held_out(found, [name for name, _ in fits], folder / "held_out.png")
+    figures.draw_p_m(posteriors, folder / "posterior.png")
     figures.draw_posterior(found.posterior_extended, folder / "corner.png")
-    write_campaign_page(found, summary, suggestions, folder)
+    write_campaign_page(found, summary, suggestions, views, maps, folder)
     return summary, campaign_diagnosis_lines(found, suggestions)
+
+
+def _draw_fits(
+    found: Calibration | Diagnosis, fits: list[tuple[str, Fit]], folder: Path
+) -> tuple[list[DropView], list[MapView]]:
+    """Pictures of drops and scans with each named fit, and the views that the page shows of them."""
+    from ..report import campaign_figures as figures
+    from ..report.drop_views import view_drops
+    from ..report.map_views import measure_maps, view_maps
+
+    views = view_drops(found.bench, fits)
+    figures.draw_drops(views, folder / "drops.png")
+    figures.draw_misfit(views, folder / "misfit.png")
+    maps = measure_maps(found.campaign, view_maps(found.bench, fits))
+    if maps:
+        figures.draw_maps(maps, folder / "maps.png")
+    if found.bench.undisturbed:
+        figures.draw_undisturbed(found.bench, folder / "undisturbed.png")
+    return views, maps

@@ -5,76 +5,54 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import corner
 import matplotlib.pyplot as plt
 import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
-from ..inference.fitting import Fit, Workbench
-from ..inference.forward import predict_depth
-from ..inference.likelihood import DropModel
+from ..inference.fitting import Workbench
 from ..inference.posterior import Posterior
 from ..records import FloatArray
+from .drop_views import DropView
 from .figures import BLUE, GREY, INK, ORANGE, STYLE, new_figure
+from .map_views import MapView
+
+COLOURS = (ORANGE, BLUE)  # nominal, extended
+PHI: dict[str, Any] = {"vmin": 0.13, "vmax": 0.28, "cmap": "viridis"}
+DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
 
-def predict_drop(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
-    """Stated depth (m) at the drop's frames."""
-    name = model.observed.name
-    instrument = bench.instruments(fit.values)[name]
-    log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[name]
-    code = model.table.code(log_p_m, model.instant.log_speed, fit.values)
-    offset = instrument.row_offset_px * model.observed.pixel
-    offset += contact_offset(bench, fit) * model.radius
-    time = model.observed.time
-    return predict_depth(code, time, model.instant, instrument.pixel_factor, instrument.rate_factor, offset)
-
-
-def contact_offset(bench: Workbench, fit: Fit) -> float:
-    """Best value, in tip radii, of the offset of the contact that the likelihood allows all drops in common."""
-    linear, size = fit.linear, bench.terms.contact_offset
-    column = np.zeros(linear.residual.size)
-    for model in fit.models:
-        section = linear.sections[model.observed.name]
-        column[section.start : section.start + model.matrix.shape[0]] = size * model.radius
-    return size * float(column @ np.linalg.solve(linear.covariance, linear.residual))
-
-
-def draw_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) -> Path:
-    """Depth against time of every drop with each fit, and below it what is left, in µm."""
-    count = len(bench.models)
-    columns = min(5, count)
-    lines = math.ceil(count / columns)
+def draw_drops(views: Sequence[DropView], path: Path) -> Path:
+    """Depth against time of every drop with each fit, and below it what is left, in µm, with its band."""
+    columns = min(4, len(views))
+    lines = math.ceil(len(views) / columns)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
             2 * lines,
             columns,
-            figsize=(2.7 * columns, 3.0 * lines),
+            figsize=(max(2.9 * columns, 5.0), 3.1 * lines),
             height_ratios=[2, 1] * lines,
             layout="constrained",
             squeeze=False,
         )
         for ax in axes.flat:
             ax.set_visible(False)
-        for k, model in enumerate(fits[0][1].models):
+        for k, view in enumerate(views):
             above, below = axes[2 * (k // columns), k % columns], axes[2 * (k // columns) + 1, k % columns]
             above.set_visible(True)
             below.set_visible(True)
-            observed = model.observed
-            clock = (observed.time - model.instant.contact_time) * 1e3
-            seen = clock > -0.3 * clock.max()
-            above.plot(clock[seen], observed.depth[seen] * 1e3, ".", color=INK, ms=3, label="measured")
-            for (name, fit), color in zip(fits, (ORANGE, BLUE), strict=False):
-                other = next(m for m in fit.models if m.observed.name == observed.name)
-                depth = predict_drop(bench, fit, other)
-                above.plot(clock[seen], depth[seen] * 1e3, "-", color=color, lw=1.2, label=name)
-                left = (observed.depth - depth)[seen] * 1e6
-                below.plot(clock[seen], left, "-", color=color, lw=1.0)
-            below.axhspan(-1e6 * observed.sigma, 1e6 * observed.sigma, color=GREY, alpha=0.25, lw=0)
+            clock = view.clock * 1e3
+            above.plot(clock, view.measured * 1e3, ".", color=INK, ms=4, label="measured")
+            below.axhline(0.0, color=INK, lw=0.6)
+            band = 2e6 * view.allowed
+            below.fill_between(clock, -band, band, color=GREY, alpha=0.25, lw=0)
+            for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
+                above.plot(clock, depth * 1e3, "-", color=color, lw=1.2, label=name)
+                below.plot(clock, view.left(name) * 1e6, ".-", color=color, lw=0.9, ms=3)
             above.set_title(
-                f"{observed.name}  {2e3 * model.radius:.3g} mm, {math.exp(model.instant.log_speed):.2f} m/s",
-                fontsize=8,
+                f"{view.name}  {2e3 * view.projectile.tip_radius:.3g} mm, {view.speed:.2f} m/s", fontsize=8
             )
             above.invert_yaxis()
             above.tick_params(labelbottom=False, labelsize=7)
@@ -82,42 +60,65 @@ def draw_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) ->
             if k % columns == 0:
                 above.set_ylabel("depth (mm)", fontsize=8)
                 below.set_ylabel("left (µm)", fontsize=8)
-            below.set_xlabel("time (ms)", fontsize=8)
+            below.set_xlabel("time since contact (ms)", fontsize=8)
         axes[0, 0].legend(fontsize=7)
         figure.savefig(path)
         plt.close(figure)
     return path
 
 
-def draw_maps(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) -> Path:
-    """Filling factor measured, and measured minus simulated for each fit, per scan."""
-    count = len(bench.scans)
+def draw_misfit(views: Sequence[DropView], path: Path) -> Path:
+    """Measured minus simulated depth at the stop against impact speed, a symbol a projectile, bars of two sigma."""
+    with new_figure(path, 7.2, 3.8) as figure:
+        ax = figure.subplots()
+        ax.axhline(0.0, color=INK, lw=0.8)
+        for view, marker in zip(views, projectile_markers(views), strict=True):
+            for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
+                deepest = float(np.mean(depth[-3:]))
+                left = 100 * (view.at_stop() - view.at_stop(name)) / deepest
+                bar = 200 * view.allowed_at_stop / deepest
+                ax.errorbar(view.speed, left, bar, fmt=marker, color=color, ms=5, capsize=2, lw=0.8)
+        for name, color in zip(views[0].simulated, COLOURS, strict=False):
+            ax.plot([], [], "s", color=color, label=name)
+        for label, marker in dict(
+            zip(map(say_projectile, views), projectile_markers(views), strict=True)
+        ).items():
+            ax.plot([], [], marker, color=GREY, label=label)
+        ax.set_xlabel("impact speed (m/s)")
+        ax.set_ylabel("measured − simulated depth (%)")
+        ax.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return path
+
+
+def say_projectile(view: DropView) -> str:
+    p = view.projectile
+    return f"{2e3 * p.tip_radius:.3g} mm {p.tip}, {p.mass * 1e6:.3g} mg"
+
+
+def projectile_markers(views: Sequence[DropView]) -> list[str]:
+    """matplotlib marker per view, one for each projectile."""
+    known = list(dict.fromkeys(map(say_projectile, views)))
+    return ["osD^vP*X<>"[known.index(say_projectile(view)) % 10] for view in views]
+
+
+def draw_maps(views: Sequence[MapView], path: Path) -> Path:
+    """Per scan a row: filling factor measured, simulated, and their difference for each fit."""
+    columns = 1 + 2 * max(len(view.simulated) for view in views)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
-            count,
-            1 + len(fits),
-            figsize=(3.4 * (1 + len(fits)), 3.2 * count),
-            layout="constrained",
-            squeeze=False,
-        )
-        for k, scan in enumerate(bench.scans):
-            found = scan.observed.reduced.map
-            picture = axes[k, 0].pcolormesh(
-                found.r * 1e3, found.z * 1e3, found.filling_factor, vmin=0.13, vmax=0.28, cmap="viridis"
-            )
-            axes[k, 0].set_title(f"{scan.observed.name}: φ measured")
-            figure.colorbar(picture, ax=axes[k, 0], shrink=0.8)
-            for q, (name, fit) in enumerate(fits, start=1):
-                code = scan.table.code(fit.log_p_m, scan.log_speed, fit.values)
-                scale = bench.instruments(fit.values)[scan.observed.name].ct_scale
-                left = np.full(scan.observed.cells.shape, np.nan)
-                left[scan.observed.cells] = scan.observed.filling_factor - scale * code[1:]
-                picture = axes[k, q].pcolormesh(
-                    found.r * 1e3, found.z * 1e3, left, vmin=-0.02, vmax=0.02, cmap="RdBu_r"
-                )
-                axes[k, q].set_title(f"measured − {name}")
-                figure.colorbar(picture, ax=axes[k, q], shrink=0.8)
-            for ax in axes[k]:
+            len(views), columns, figsize=(max(3.1 * columns, 4.6), 3.4 * len(views)), layout="constrained",
+            squeeze=False, sharex=True, sharey="row",
+        )  # fmt: skip
+        for k, view in enumerate(views):
+            shown: list[tuple[str, FloatArray, dict]] = [("φ measured", view.measured, PHI)]
+            for name in view.simulated:
+                shown.append((f"φ simulated, {name}", view.simulated[name], PHI))
+                shown.append((f"measured − {name}", view.left(name), DIFFERENCE))
+            for ax, (title, values, colours) in zip(axes[k], shown, strict=False):
+                found = view.map
+                picture = ax.pcolormesh(found.r * 1e3, found.z * 1e3, values, **colours)
+                ax.set_title(f"{view.name}: {title}", fontsize=9)
+                figure.colorbar(picture, ax=ax, shrink=0.8)
                 ax.set_aspect("equal")
                 ax.set_xlabel("r (mm)")
             axes[k, 0].set_ylabel("z (mm)")
@@ -162,13 +163,51 @@ def draw_causes(found: Diagnosis, path: Path) -> Path:
     return path
 
 
-def draw_held_out(found: Diagnosis, path: Path) -> Path:
-    """Rms of each held-out drop, nominal against extended."""
+def draw_p_m(posteriors: Sequence[tuple[str, Posterior]], path: Path) -> Path:
+    """Posterior density of p_m in kPa, a line a model."""
+    with new_figure(path, 6.4, 2.8) as figure:
+        ax = figure.subplots()
+        for (name, posterior), color in zip(posteriors, COLOURS, strict=False):
+            values = posterior.samples("p_m_Pa") / 1e3
+            ax.hist(values, bins=60, density=True, histtype="stepfilled", alpha=0.35, color=color, label=name)
+        ax.set_xlabel("p_m (kPa)")
+        ax.set_yticks([])
+        ax.legend(fontsize=8)
+    return path
+
+
+def draw_undisturbed(bench: Workbench, path: Path) -> Path:
+    """Filling factor of dust that no bead reached, against depth, and what is stated of the sample."""
+    sample = bench.campaign.sample
+    with new_figure(path, 6.4, 3.2) as figure:
+        ax = figure.subplots()
+        two = 2 * sample.filling_factor_sigma
+        ax.axhspan(sample.filling_factor - two, sample.filling_factor + two, color=GREY, alpha=0.25, lw=0)
+        for dust, color in zip(bench.undisturbed, (BLUE, ORANGE, INK, GREY) * 20, strict=False):
+            ax.errorbar(
+                dust.depth * 1e3,
+                dust.filling_factor,
+                dust.sigma,
+                fmt=".",
+                color=color,
+                lw=0.7,
+                label=dust.name,
+            )
+        ax.set_xlabel("depth (mm)")
+        ax.set_ylabel("filling factor")
+        ax.legend(fontsize=8)
+    return path
+
+
+def draw_held_out(found: Diagnosis, labels: Sequence[str], path: Path) -> Path:
+    """Rms of each held-out drop, a bar a model."""
+    sizes = [found.held_out_nominal.rms, found.held_out_extended.rms][: len(labels)]
     with new_figure(path, 6.4, 3.2) as figure:
         ax = figure.subplots()
         place = np.arange(len(found.held_out_nominal.names))
-        ax.bar(place - 0.2, found.held_out_nominal.rms * 1e6, 0.4, color=ORANGE, label="nominal")
-        ax.bar(place + 0.2, found.held_out_extended.rms * 1e6, 0.4, color=BLUE, label="extended")
+        width = 0.8 / len(labels)
+        for k, (label, rms) in enumerate(zip(labels, sizes, strict=True)):
+            ax.bar(place - 0.4 + width * (k + 0.5), rms * 1e6, width, color=COLOURS[k], label=label)
         ax.plot(
             place,
             found.held_out_extended.expected * 1e6,

@@ -1,106 +1,242 @@
-"""report.html of a diagnosed campaign: one file, no network, light and dark, printable."""
+"""report.html of a measured campaign, diagnosed or calibrated: what stands where on the page."""
 
 from __future__ import annotations
 
-import base64
-import math
+from collections.abc import Sequence
 from pathlib import Path
-
-import jinja2
+from typing import Any
 
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion
-from ..sph import solver_hash
+from ..inference.calibrate import Calibration
+from ..inference.fitting import Workbench
+from ..inference.posterior import Posterior
+from ..records import Campaign
 from .campaign_tables import say_verdict
+from .campaign_words import (
+    BADGES,
+    describe_calibration,
+    describe_causes,
+    describe_gain,
+    describe_maps,
+    describe_measurement,
+    describe_misfit,
+    describe_numerics,
+    list_confusable,
+)
+from .drop_views import DropView
+from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
+from .map_views import MapView
+from .page import read_picture, show_number, write_html
+from .provenance import trace_origin
 
 PICTURES = {
-    "drops.png": "Every drop: measured depth, the nominal and the extended simulation, and what each leaves.",
-    "maps.png": "Every scan: filling factor measured, and measured minus simulated.",
-    "causes.png": "Probabilities of the causes.",
-    "held_out.png": "Held-out drops: what the nominal and the extended model miss of a drop that no fit has seen.",
-    "corner.png": "Posterior of the extended model.",
+    "drops": "Every drop: measured depth against time, each simulation, and below it what each leaves, with the band of what a "
+    "true model may leave. The numbers stand in the table above.",
+    "misfit": "Measured minus simulated depth at the stop, in percent, against impact speed.",
+    "maps": "Every scan: filling factor measured, simulated, and measured minus simulated.",
+    "held_out": "Held-out drops: what each model misses of a drop that no fit has seen.",
+    "posterior": "Posterior density of p_m.",
+    "corner": "Posterior of the extended model, every parameter against every other.",
+    "undisturbed": "Filling factor of undisturbed dust against depth.",
 }
 
-PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ name }}: what the simulation gets wrong</title>
-<style>
-:root { color-scheme: light dark; --ink: #222; --soft: #666; --line: #ddd; --page: #fff }
-@media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --soft: #aaa; --line: #444; --page: #181818 }
- img { background: #fff } }
-body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page); max-width: 66rem; margin: 2rem auto;
- padding: 0 1rem }
-h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem } .lead { font-size: 1.15rem }
-.wide { overflow-x: auto } table { border-collapse: collapse; width: 100% }
-th, td { text-align: left; padding: .3rem .7rem; border-bottom: 1px solid var(--line) }
-td.number { text-align: right; font-variant-numeric: tabular-nums }
-figure { margin: 1.2rem 0 } img { max-width: 100%; height: auto } figcaption, small { color: var(--soft) }
-@media print { body { max-width: none; font-size: 11px } figure { break-inside: avoid } }
-</style></head><body>
-<main>
-<h1>{{ name }}: what the simulation gets wrong</h1>
-<p class="lead">{{ sentence }}</p>
-<h2>What was measured</h2>
-<p>{{ drops }} drops and {{ scans }} scans; {{ points }} data enter the likelihood. {{ description }}</p>
-<p>Calibration of the nominal model: p_m = {{ "%.3f"|format(nominal) }} kPa; it explains the data with p = {{ "%.2g"|format(p) }}.
-Scatter of ln p_m from sample to sample: {{ "%.3f ± %.3f"|format(scatter[0], scatter[1]) }}.</p>
-<h2>Causes</h2>
-<div class="wide"><table><tr><th>cause</th><th>probability</th><th>parameters (90 %)</th></tr>
-{% for cause in causes %}<tr><td>{{ cause.causes|join(" + ") }}</td><td class="number">{{ "%.3f"|format(cause.probability) }}</td>
-<td>{% for key, q in cause.parameters.items() %}{{ key }} = {{ "%.4g"|format(q.q50) }} ({{ "%.4g"|format(q.q05) }} to
-{{ "%.4g"|format(q.q95) }}) {{ q.unit }}<br>{% endfor %}</td></tr>{% endfor %}</table></div>
-{% if confusable %}<h2>What this campaign can hardly tell apart</h2>
-<ul>{% for a, b, c in confusable %}<li>{{ a }} and {{ b }} (cosine {{ "%+.2f"|format(c) }})</li>{% endfor %}</ul>{% endif %}
-<h2>Gain on held-out drops</h2>
-<p>Each drop was predicted once from the others: rms {{ "%.1f"|format(gain.rms_nominal_m * 1e6) }} µm nominal,
-{{ "%.1f"|format(gain.rms_extended_m * 1e6) }} µm extended, {{ "%.1f"|format(gain.rms_noise_m * 1e6) }} µm expected of a true
-model; ln score {{ "%+.1f ± %.1f"|format(gain.log_score_difference, gain.log_score_difference_sigma) }};
-{{ "%.0f"|format(100 * gain.fraction_of_discrepancy_removed) }} % of the removable discrepancy is gone.</p>
-{% if suggestions %}<h2>Next experiment</h2><ol>{% for s in suggestions %}<li>{{ s.change }}: {{ s.information_bits }} bits</li>
-{% endfor %}</ol>{% endif %}
-<h2>Pictures</h2>
-{% for source, text in pictures %}<figure><img alt="{{ text }}" src="data:image/png;base64,{{ source }}">
-<figcaption>{{ text }}</figcaption></figure>
-{% endfor %}
-{% if warnings %}<h2>Warnings</h2><ul>{% for warning in warnings %}<li>{{ warning }}</li>{% endfor %}</ul>{% endif %}
-<h2>How it was made</h2>
-<p><small>Numerical error of the depth {{ "%.2g"|format(100 * numerical.depth_relative) }} % at a spacing of
-{{ "%.3g"|format(numerical.spacing_m * 1e6) }} µm; {{ new }} new runs, {{ reused }} from the store; solver {{ solver }};
-{{ "%.0f"|format(wall) }} s.</small></p>
-</main></body></html>
-"""
 
-
-def write_campaign_page(found: Diagnosis, summary: dict, suggestions: list[Suggestion], folder: Path) -> Path:
-    """report.html from a diagnosis, its summary and the pictures in the folder."""
-    pictures = [
-        (base64.b64encode((folder / name).read_bytes()).decode(), text)
-        for name, text in PICTURES.items()
-        if (folder / name).is_file()
+def write_campaign_page(
+    found: Diagnosis,
+    summary: dict,
+    suggestions: list[Suggestion],
+    views: Sequence[DropView],
+    maps: Sequence[MapView],
+    folder: Path,
+) -> Path:
+    """report.html of a diagnosis, its summary and the static pictures that lie in the folder."""
+    labels = list(views[0].simulated)
+    posteriors = [(labels[0], found.posterior_nominal)]
+    if len(labels) > 1:
+        posteriors.append((labels[1], found.posterior_extended))
+    gain = summary["gain"]
+    quantiles = summary["p_m_Pa"]
+    tiles = [
+        ("p_m, nominal", f"{quantiles['nominal']['q50'] / 1e3:.2f} kPa", _between(quantiles["nominal"])),
+        (
+            "p-value of the nominal model",
+            show_number(found.p_value, "{:.2g}"),
+            "it does not explain the data" if found.p_value < 0.05 else "it explains the data",
+        ),
+        (
+            "best cause",
+            f"{found.verdict.probabilities[0][1]:.2f}",
+            " + ".join(found.verdict.probabilities[0][0]),
+        ),
     ]
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    text = environment.from_string(PAGE).render(
-        name=found.campaign.name,
-        description=found.campaign.description,
+    if len(labels) > 1:
+        percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
+        extended = quantiles["extended"]
+        tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))
+        tiles.append(("gone on held-out drops", percent, "of the removable discrepancy"))
+    figures = _figures(found.bench, views, maps, posteriors)
+    held = [(labels[0], found.held_out_nominal.rms)]
+    if len(labels) > 1:
+        held.append((labels[1], found.held_out_extended.rms))
+    figures["held_out"] = plot_held_out(found.held_out_nominal.names, held, found.held_out_extended.expected)
+    causes = describe_causes(found, summary)
+    confusable = list_confusable(found)
+    return _write(
+        folder,
+        found.campaign,
+        found.bench,
+        views,
+        maps,
+        figures,
+        page_title="what the simulation gets wrong",
+        tone=found.verdict.word,
+        badge=BADGES[found.verdict.word],
         sentence=say_verdict(found),
-        drops=len(found.bench.models),
-        scans=len(found.bench.scans),
-        points=found.nominal.points,
-        nominal=math.exp(found.nominal.log_p_m) / 1e3,
-        p=found.p_value,
-        scatter=found.scatter,
-        causes=[cause for cause in summary["causes"] if cause["probability"] > 1e-3],
-        confusable=found.confusable,
-        gain=summary["gain"],
+        tiles=tiles,
+        calibration=describe_calibration(
+            found.nominal, found.p_value, found.scatter, posteriors, found.bench, len(views)
+        ),
+        diagnosed=True,
+        causes=causes,
+        confusable=confusable,
+        gain=describe_gain(found, summary, labels),
         suggestions=suggestions,
-        pictures=pictures,
+        numerics=describe_numerics(summary["numerical_error"], found.bench),
         warnings=found.warnings,
-        numerical=summary["numerical_error"],
-        new=found.runs_new,
-        reused=found.runs_reused,
-        solver=solver_hash(),
-        wall=found.wall,
+        runs=(found.runs_new, found.runs_reused, found.wall),
     )
-    path = folder / "report.html"
-    path.write_text(text, encoding="utf-8")
-    return path
+
+
+def write_calibration_page(
+    found: Calibration,
+    summary: dict,
+    numerical_error: dict[str, float],
+    views: Sequence[DropView],
+    maps: Sequence[MapView],
+    folder: Path,
+) -> Path:
+    """report.html of a calibration alone: no causes are searched."""
+    label = next(iter(views[0].simulated))
+    posteriors = [(label, found.posterior)]
+    q = summary["p_m_Pa"]
+    explains = found.p_value >= 0.05
+    sentence = (
+        f"p_m = {q['q50'] / 1e3:.2f} kPa, 90 % between {q['q05'] / 1e3:.2f} and {q['q95'] / 1e3:.2f} kPa, from "
+        f"{len(views)} drops; the simulation {'explains' if explains else 'does not explain'} them "
+        f"(p = {found.p_value:.2g})" + ("." if explains else "; labsim diagnose asks why.")
+    )
+    others = [name for name in found.posterior.names if name != "p_m_Pa"]
+    tiles = [
+        ("p_m", f"{q['q50'] / 1e3:.3f} kPa", _between(q)),
+        *((name, show_number(summary["parameters"][name]["q50"], "{:.3g}"), "") for name in others[:2]),
+        (
+            "p-value of the model",
+            show_number(found.p_value, "{:.2g}"),
+            "it explains the data" if explains else "it does not explain the data",
+        ),
+    ]
+    return _write(
+        folder,
+        found.campaign,
+        found.bench,
+        views,
+        maps,
+        _figures(found.bench, views, maps, posteriors),
+        page_title="calibration",
+        tone="none" if explains else "unknown",
+        badge="Calibrated" if explains else "Calibrated, but the model does not explain the data",
+        sentence=sentence,
+        tiles=tiles,
+        calibration=describe_calibration(
+            found.fit,
+            found.p_value,
+            (found.scatter, found.scatter_sigma),
+            posteriors,
+            found.bench,
+            len(views),
+        ),
+        diagnosed=False,
+        numerics=describe_numerics(numerical_error, found.bench),
+        warnings=found.warnings,
+        runs=(found.runs_new, found.runs_reused, found.wall),
+    )
+
+
+def _between(q: dict[str, float]) -> str:
+    return f"90 %: {q['q05'] / 1e3:.2f} to {q['q95'] / 1e3:.2f} kPa"
+
+
+def _figures(
+    bench: Workbench,
+    views: Sequence[DropView],
+    maps: Sequence[MapView],
+    posteriors: Sequence[tuple[str, Posterior]],
+) -> dict[str, Any]:
+    figures = {"p_m": plot_p_m(posteriors), "misfit": plot_misfit(views)}
+    for k, view in enumerate(views):
+        figures[f"drop{k}"] = plot_drop(view)
+    for k, each in enumerate(maps):
+        figures[f"map{k}"] = plot_map(each, each.measured)
+        for q, name in enumerate(each.simulated):
+            figures[f"map{k}_simulated{q}"] = plot_map(each, each.simulated[name])
+            figures[f"map{k}_left{q}"] = plot_map(each, each.left(name), difference=True)
+    if bench.undisturbed:
+        sample = bench.campaign.sample
+        profiles = [(dust.name, dust.depth, dust.filling_factor, dust.sigma) for dust in bench.undisturbed]
+        figures["undisturbed"] = plot_undisturbed(
+            profiles, (sample.filling_factor, sample.filling_factor_sigma)
+        )
+    return figures
+
+
+def _write(
+    folder: Path,
+    campaign: Campaign,
+    bench: Workbench,
+    views: Sequence[DropView],
+    maps: Sequence[MapView],
+    figures: dict[str, Any],
+    *,
+    warnings: Sequence[str],
+    runs: tuple[int, int, float],
+    diagnosed: bool,
+    **values: Any,
+) -> Path:
+    contents = [
+        ("measurement", "What was measured"),
+        ("calibration", "Calibration"),
+        ("drops", "Drop by drop"),
+    ]
+    if campaign.scans:
+        contents.append(("maps", "Maps of the dust"))
+    if diagnosed:
+        contents += [
+            ("causes", "Causes"),
+            ("confusable", "Hard to tell apart"),
+            ("gain", "Gain"),
+            ("next", "Next experiment"),
+        ]
+    contents += [("numerics", "Numerical error"), ("warnings", "Warnings"), ("made", "Versions and hashes")]
+    notes = {"drops": str(len(views)), "warnings": str(len(warnings)) if warnings else ""}
+    pictures = {name: read_picture(folder / f"{name}.png", text) for name, text in PICTURES.items()}
+    return write_html(
+        folder / "report.html",
+        "campaign.html",
+        figures,
+        name=campaign.name,
+        description=campaign.description,
+        labels=list(views[0].simulated),
+        contents=[(anchor, title, notes.get(anchor, "")) for anchor, title in contents],
+        measurement=describe_measurement(campaign, bench, views),
+        misfit=describe_misfit(views),
+        maps=describe_maps(campaign, bench, maps) if campaign.scans else None,
+        pictures=pictures,
+        diagnosed=diagnosed,
+        warnings=warnings,
+        made=trace_origin(
+            campaign,
+            [("runs", f"{runs[0]} new, {runs[1]} from the store"), ("wall time", f"{runs[2]:.0f} s")],
+        ),
+        **values,
+    )

@@ -11,7 +11,7 @@ from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..inference.calibrate import Calibration
-from ..inference.grid import DEFAULT_CELLS
+from ..inference.fitting import Workbench
 from ..inference.posterior import Posterior
 from ..inference.summary import summarise
 from ..sph import solver_hash
@@ -64,6 +64,12 @@ def campaign_calibration_lines(found: Calibration) -> str:
 def _quantiles(posterior: Posterior, name: str) -> dict[str, float]:
     q05, q50, q95 = np.quantile(posterior.samples(name), [0.05, 0.5, 0.95])
     return {"q05": float(q05), "q50": float(q50), "q95": float(q95)}
+
+
+def state_numerical_error(bench: Workbench) -> dict[str, float]:
+    """Of the simulated depth, and the spacing (m) of the smallest tip."""
+    radii = [family.projectile.tip_radius for family in bench.families if not family.is_scan]
+    return {"depth_relative": NUMERICAL_DEPTH, "spacing_m": min(radii) / bench.grid.cells}
 
 
 def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) -> dict[str, Any]:
@@ -122,10 +128,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "next_experiment": [
             {"change": each.change, "information_bits": each.information_bits} for each in suggestions
         ],
-        "numerical_error": {
-            "depth_relative": NUMERICAL_DEPTH,
-            "spacing_m": min(family.projectile.tip_radius for family in found.bench.families) / DEFAULT_CELLS,
-        },
+        "numerical_error": state_numerical_error(found.bench),
         "sample_scatter_ln_p_m": {"mean": found.scatter[0], "sd": found.scatter[1]},
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,

@@ -1,0 +1,126 @@
+"""What is shown of every drop: measured, simulated, what is left, and how much a true model may leave."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..inference.fitting import Fit, Workbench
+from ..inference.forward import predict_depth
+from ..inference.likelihood import DropModel
+from ..records import FloatArray, Projectile
+
+BEFORE = 0.3  # share of the record after contact that is shown before it
+STOP_FRAMES = 3  # the last frames whose mean stands for the depth at the stop
+
+
+@dataclass(frozen=True)
+class DropView:
+    """One drop; arrays of shape (n,), one entry a frame that is shown.
+
+    clock : s since contact of the first fit; measured : m below the undisturbed surface; simulated : name of the fit ->
+    depth (m) at the same frames; allowed : m, standard deviation of what a true model leaves of a frame, noise included;
+    noise : m, of the localisation alone.
+    """
+
+    name: str
+    projectile: Projectile
+    speed: float  # m/s at contact, of the first fit
+    clock: FloatArray
+    measured: FloatArray
+    simulated: dict[str, FloatArray]
+    allowed: FloatArray
+    noise: float
+
+    def left(self, fit: str) -> FloatArray:
+        """Measured minus simulated, m."""
+        return self.measured - self.simulated[fit]
+
+    def rms(self, fit: str) -> float:
+        """Of what is left below the surface, m."""
+        below = self.clock >= 0
+        left = self.left(fit)[below] if below.any() else self.left(fit)
+        return float(np.sqrt(np.mean(left**2)))
+
+    def at_stop(self, fit: str | None = None) -> float:
+        """Depth (m) where the record ends: measured, or of a fit."""
+        values = self.measured if fit is None else self.simulated[fit]
+        return float(np.mean(values[-STOP_FRAMES:]))
+
+    @property
+    def allowed_at_stop(self) -> float:
+        return float(np.mean(self.allowed[-STOP_FRAMES:]))
+
+    def stands_out(self, fit: str) -> bool:
+        """Whether more frames lie outside two standard deviations than a true model would leave (one in ten)."""
+        return bool(np.mean(np.abs(self.left(fit)) > 2 * self.allowed) > 0.1)
+
+
+def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropView]:
+    """Every drop that entered the likelihood, in the order of the campaign, with each named fit."""
+    views = []
+    first = fits[0][1]
+    for model in first.models:
+        observed = model.observed
+        clock = observed.time - model.instant.contact_time
+        seen = clock > -BEFORE * max(clock.max(), 1e-9)
+        simulated = {}
+        for name, fit in fits:
+            other = next(m for m in fit.models if m.observed.name == observed.name)
+            simulated[name] = predict_drop(bench, fit, other)[seen]
+        views.append(
+            DropView(
+                observed.name,
+                observed.drop.projectile,
+                math.exp(model.instant.log_speed),
+                clock[seen],
+                observed.depth[seen],
+                simulated,
+                allow_for_errors(bench, first, model)[seen],
+                observed.sigma,
+            )
+        )
+    return views
+
+
+def predict_drop(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
+    """Stated depth (m) at the drop's frames."""
+    name = model.observed.name
+    instrument = bench.instruments(fit.values)[name]
+    log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[name]
+    code = model.table.code(log_p_m, model.instant.log_speed, fit.values)
+    offset = instrument.row_offset_px * model.observed.pixel
+    offset += contact_offset(bench, fit) * model.radius
+    time = model.observed.time
+    return predict_depth(code, time, model.instant, instrument.pixel_factor, instrument.rate_factor, offset)
+
+
+def contact_offset(bench: Workbench, fit: Fit) -> float:
+    """Best value, in tip radii, of the offset of the contact that the likelihood allows all drops in common."""
+    linear, size = fit.linear, bench.terms.contact_offset
+    column = np.zeros(linear.residual.size)
+    for model in fit.models:
+        section = linear.sections[model.observed.name]
+        column[section.start : section.start + model.matrix.shape[0]] = size * model.radius
+    return size * float(column @ np.linalg.solve(linear.covariance, linear.residual))
+
+
+def allow_for_errors(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
+    """(frames,) m: standard deviation of measured minus predict_drop if the model were true.
+
+    The likelihood's own variances without what predict_drop has already moved to its best value (contact time, speed,
+    surface row, contact offset): localisation, sample scatter, stated mass and scales, error of the solver.
+    """
+    linear, observed = fit.linear, model.observed
+    place = next(k for k, other in enumerate(fit.models) if other.observed.name == observed.name)
+    points = model.matrix.shape[0]
+    start = linear.sections[observed.name].start
+    variance = np.diag(linear.covariance)[start : start + points].copy()
+    variance -= np.sum(linear.local[place][:points, :3] ** 2, axis=1)
+    variance -= (bench.terms.contact_offset * model.radius) ** 2
+    variance -= observed.sigma**2 * np.sum(model.matrix**2, axis=1)
+    systematic = np.interp(observed.time, model.matrix @ observed.time, np.maximum(variance, 0.0))
+    return np.sqrt(systematic + observed.sigma**2)
