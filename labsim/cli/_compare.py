@@ -28,6 +28,8 @@ NOT_RESULTS = {
     "store",
     "created",
     "peak_memory_bytes",
+    "measured_new",
+    "reused",
 }
 DRAWN = {".png", ".mp4", ".html", ".pvd"}
 CHAIN = "chain.h5"  # the posterior's own working file
@@ -62,7 +64,7 @@ def compare_folders(first: Path, second: Path, tolerance: float = 0.0) -> Compar
         for key in sorted(set(a) ^ set(b)):
             found.differences.append(f"{name}: {key}: only in {first if key in a else second}")
         for key in sorted(set(a) & set(b)):
-            found.numbers += int(np.size(a[key])) if isinstance(a[key], (int, float, np.ndarray)) else 0
+            found.numbers += int(np.size(a[key])) if isinstance(a[key], (int, float, list, np.ndarray)) else 0
             if difference := _differ(a[key], b[key], tolerance):
                 found.differences.append(f"{name}: {key}: {difference}")
     return found
