@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from ..campaign import read_campaign
+from ..effects import list_effects
+from ..effects.model import read_model
 from ..errors import InferenceError
 from ..inference.planar import READINGS
 from ..inference.runs import RunStore
@@ -44,6 +46,10 @@ def calibrate(
             "--parameters", help="p_m and names of effects to fit with it, with commas (tracks only)."
         ),
     ] = "p_m",
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="model.toml whose effects belong to the simulation (tracks only)."),
+    ] = None,
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
     store: options.Store = None,
@@ -59,10 +65,14 @@ def calibrate(
         names = tuple(name.strip() for name in parameters.split(",") if name.strip() not in ("", "p_m"))
         with options.show_progress(quiet) as progress:
             settings = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
+            if model is not None:
+                settings["model"] = read_model(model, list_effects(read))
             summary, lines = calibrate_measured(read, folder, RunStore(store), names, settings)
         options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
         return
     check_summary(read)
+    if model is not None:
+        raise InferenceError(model, "--model", "is for campaigns with tracks; these are published figures")
     folder = options.make_output_folder(out, campaign, "calibrate")
     with options.show_progress(quiet) as progress:
         found = calibrate_summary(

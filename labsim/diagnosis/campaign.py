@@ -17,14 +17,16 @@ from ..inference.runs import Progress, RunStore
 from ..records import Campaign
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
-from .screen import Screening, screen
+from .screen import Screening, screen, screen_pairs
 from .shapes import lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 6  # effects that cost runs
-MOST_PAIRS = 3
+MOST_PAIRS = 3  # partners of one single
+MOST_JOINT = 2  # pairs taken from the linear screening alone
+LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
 CONFUSABLE = 0.9  # cosine of fingerprints
 
 
@@ -54,7 +56,21 @@ class Diagnosis:
     warnings: tuple[str, ...]
 
 
-def diagnose_campaign(
+@dataclass(frozen=True)
+class Judgement:
+    """What is at work in a campaign, before any posterior is sampled. best : the fit that the verdict rests on."""
+
+    bench: Workbench
+    nominal: Fit
+    rivals: list[Fit]
+    screening: Screening
+    unknown: UnknownFit
+    verdict: Verdict
+    p_value: float
+    best: Fit
+
+
+def judge_campaign(
     campaign: Campaign,
     store: RunStore,
     *,
@@ -65,10 +81,8 @@ def diagnose_campaign(
     use_scans: bool = False,
     cells: int | None = None,
     measurements: Measurements | None = None,
-) -> Diagnosis:
+) -> Judgement:
     """Measure, calibrate, screen, confirm, judge. Raises LabsimError subclasses as its parts do."""
-    began = time.perf_counter()
-    random = np.random.default_rng(seed)
     bench, nominal = prepare(
         campaign,
         store,
@@ -80,7 +94,7 @@ def diagnose_campaign(
         measurements=measurements,
     )
     lay_out_shapes(bench)
-    screening = screen(bench, nominal, random)
+    screening = screen(bench, nominal, np.random.default_rng(seed))
     unknown = fit_unknown(bench, nominal)
     rivals, screening = merge_variants(bench, nominal, confirm_singles(bench, nominal, screening), screening)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
@@ -99,9 +113,36 @@ def diagnose_campaign(
     freedom = max(nominal.points - 1 - 2 * len(bench.models), 1)
     omnibus = float(chi2.sf(nominal.chi_square, freedom))
     p_value = min(1.0, 2.0 * min(screening.p_value, omnibus))
-    held_nominal = predict_held_out(bench, nominal)
-    held_best = predict_held_out(bench, best)
-    scatter = estimate_scatter(bench, nominal)
+    return Judgement(bench, nominal, rivals, screening, unknown, verdict, p_value, best)
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    store: RunStore,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 1,
+    progress: Progress | None = None,
+    use_scans: bool = False,
+    cells: int | None = None,
+    measurements: Measurements | None = None,
+) -> Diagnosis:
+    """judge_campaign, and what follows from it: gain on held-out drops, posteriors without and with the extension."""
+    began = time.perf_counter()
+    found = judge_campaign(
+        campaign,
+        store,
+        workers=workers,
+        scheduler=scheduler,
+        seed=seed,
+        progress=progress,
+        use_scans=use_scans,
+        cells=cells,
+        measurements=measurements,
+    )
+    bench, nominal, best = found.bench, found.nominal, found.best
+    held_nominal, held_best = predict_held_out(bench, nominal), predict_held_out(bench, best)
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
     low, high = campaign.p_m_range
@@ -111,19 +152,19 @@ def diagnose_campaign(
         campaign,
         bench,
         nominal,
-        rivals,
-        screening,
-        unknown,
-        verdict,
-        p_value,
-        list_confusable(screening),
+        found.rivals,
+        found.screening,
+        found.unknown,
+        found.verdict,
+        found.p_value,
+        list_confusable(found.screening),
         held_nominal,
         held_best,
         measure_gain(held_nominal, held_best),
         sample_fit(bench, nominal, seed=seed, progress=progress),
         sample_fit(bench, best, seed=seed, progress=progress),
         best,
-        scatter,
+        estimate_scatter(bench, nominal),
         store.new,
         store.reused,
         time.perf_counter() - began,
@@ -148,23 +189,31 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
 
 
 def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening) -> list[Fit]:
-    """Pairs made of the best single and others, where the best single leaves more than noise."""
-    if not singles:
-        return []
+    """Pairs that the linear screening asks for: partners of the best singles, and those that only work together."""
     ranked = sorted(singles, key=lambda fit: -fit.evidence)
-    first = ranked[0]
-    freedom = max(first.points - 2 - 2 * len(bench.models), 1)
-    if first.evidence < nominal.evidence + 3 or chi2.sf(first.chi_square, freedom) > 0.05:
-        return []
-    pairs: list[Hypothesis] = []
-    lead = first.hypothesis[0]
-    again = screen(bench, first, np.random.default_rng(0), [n for n in bench.effects if n != lead])
-    for score in again.scores[:MOST_PAIRS]:
-        if score.log_bayes > 0:
-            pairs.append((lead, score.name))
+    starts: dict[Hypothesis, Fit] = {}
+    for lead in ranked[:2]:
+        if lead.evidence < max(nominal.evidence, ranked[0].evidence - CLOSE) + LEAST_GAIN:
+            continue
+        name = lead.hypothesis[0]
+        again = screen(bench, lead, np.random.default_rng(0), [n for n in bench.effects if n != name])
+        for score in again.scores[:MOST_PAIRS]:
+            pair = (name, score.name)
+            if score.log_bayes > LEAST_GAIN and tuple(reversed(pair)) not in starts:
+                starts[pair] = lead
+    top = ranked[0].evidence - nominal.evidence if ranked else 0.0
+    for pair, log_bayes in screen_pairs(bench, screening)[:MOST_JOINT]:
+        known = any(set(pair) == set(other) for other in starts)
+        if not known and log_bayes > max(top, 0.0) + LEAST_GAIN:
+            starts[pair] = nominal
     return [
-        fit_hypothesis(bench, pair, (first.log_p_m, {**first.values, pair[1]: 0.0}), models=first.models)
-        for pair in pairs
+        fit_hypothesis(
+            bench,
+            pair,
+            (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair}),
+            models=start.models,
+        )
+        for pair, start in starts.items()
     ]
 
 

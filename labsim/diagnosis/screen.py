@@ -93,6 +93,24 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     return Screening(scores, names, cosines, p_value, residual, fingerprints)
 
 
+def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str, str], float]]:
+    """ln Bayes factors of all pairs against the nominal model, linear, best first."""
+    widths = np.array([bench.effects[name].amplitudes[0].scale for name in screening.names])
+    columns = screening.fingerprints * widths
+    gram, towards = columns.T @ columns, columns.T @ screening.residual
+    found = []
+    for i, first in enumerate(screening.names):
+        for j in range(i + 1, len(screening.names)):
+            own = np.ix_((i, j), (i, j))
+            information = gram[own] + np.eye(2)
+            pull = towards[[i, j]]
+            log_bayes = (
+                0.5 * pull @ np.linalg.solve(information, pull) - 0.5 * np.linalg.slogdet(information)[1]
+            )
+            found.append(((first, screening.names[j]), float(log_bayes)))
+    return sorted(found, key=lambda item: -item[1])
+
+
 def screening_node(log_p_m: float) -> int:
     """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
     whose nominal p_m an effect has driven off still share their fingerprints' runs."""

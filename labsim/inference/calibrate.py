@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,13 +12,14 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 
-from ..effects import list_effects
+from ..effects import Parameter, list_effects
+from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray
 from .fitting import Fit, Workbench, fit_hypothesis, linearise_at, open_workbench
 from .likelihood import Terms
 from .measure import Measurements, measure
-from .posterior import Posterior, measure_residual, sample
+from .posterior import Posterior, QuadraticResidual, measure_residual, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
 
@@ -51,6 +52,7 @@ def prepare(
     use_scans: bool = False,
     cells: int | None = None,
     measurements: Measurements | None = None,
+    model: Model | None = None,
 ) -> tuple[Workbench, Fit]:
     """Measure the campaign (where that has not been done) and fit the nominal model."""
     seen = measurements or measure(campaign)
@@ -66,6 +68,7 @@ def prepare(
         drops=seen.drops,
         scans=[observe_scan(each) for each in seen.reduced] if use_scans else [],
         undisturbed=seen.dust,
+        model=model,
         cells=cells,
     )
     bench.warnings += seen.warnings
@@ -78,7 +81,7 @@ def calibrate(
     parameters: Sequence[str] = ("p_m",),
     *,
     store: RunStore | None = None,
-    start: Mapping[str, float] | None = None,
+    model: Model | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     seed: int = 1,
@@ -88,20 +91,31 @@ def calibrate(
 ) -> Calibration:
     """Posterior of p_m (Pa) and of effects named in ``parameters`` ("shear_strength" or "shear_strength.factor").
 
-    start : values of further effects to hold fixed at (from model.toml). Returns a Calibration; its posterior opens with ArviZ.
+    model : effects (and material) held fixed as part of the simulation, as read from a model.toml.
+    Returns a Calibration; its posterior opens with ArviZ.
     Raises InferenceError for an unknown parameter, MeasurementError and SimulationError as the parts do.
     """
     began = time.perf_counter()
     store = store or RunStore()
     names = tuple(name.split(".")[0] for name in parameters if name not in ("p_m", "p_m_Pa"))
     bench, nominal = prepare(
-        campaign, store, workers=workers, scheduler=scheduler, progress=progress, use_scans=use_scans
+        campaign,
+        store,
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+        use_scans=use_scans,
+        model=model,
     )
     for name in names:
+        if model is not None and name in dict(model.effects):
+            raise InferenceError(
+                campaign.folder, f"parameter {name}", "is held by the model; leave one of the two out"
+            )
         if name not in bench.effects:
             reason = bench.reasons.get(name, f"is none of {', '.join(sorted(bench.effects))}")
             raise InferenceError(campaign.folder, f"parameter {name}", reason)
-    fit = fit_hypothesis(bench, names, (nominal.log_p_m, start or {})) if names else nominal
+    fit = fit_hypothesis(bench, names, (nominal.log_p_m, {})) if names else nominal
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = float(chi2.sf(fit.chi_square, max(fit.points - 1 - len(names) - _free(bench), 1)))
@@ -139,16 +153,40 @@ def _free(bench: Workbench) -> int:
     return 2 * len(bench.models)
 
 
-def sample_fit(
-    bench: Workbench,
-    fit: Fit,
-    *,
-    seed: int = 1,
-    backend: Path | None = None,
-    progress: Progress | None = None,
-) -> Posterior:
-    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors."""
-    names = ["p_m_Pa", *(f"{name}.{bench.effects[name].amplitudes[0].name}" for name in fit.hypothesis)]
+@dataclass(frozen=True)
+class Target:
+    """The posterior about a fit, up to a constant. names : p_m_Pa and EFFECT.PARAMETER; a point is (ln p_m, amplitudes).
+
+    misfit : (m, d) -> (m,) half the squared whitened residual; log_prior : the same shapes; bounds : (d, 2) of the prior.
+    """
+
+    names: tuple[str, ...]
+    nulls: tuple[float, ...]
+    parameters: tuple[Parameter, ...]
+    misfit: QuadraticResidual
+    bounds: FloatArray
+
+    def log_prior(self, theta: FloatArray) -> FloatArray:
+        low, high = self.bounds[0]
+        inside = (theta[:, 0] >= low) & (theta[:, 0] <= high)
+        total = np.where(inside, -math.log(high - low), -np.inf)
+        for k, parameter in enumerate(self.parameters, start=1):
+            total = total + parameter.log_prior(parameter.null + theta[:, k])
+        return total
+
+    def log_probability(self, theta: FloatArray) -> FloatArray:
+        return self.log_prior(theta) - self.misfit(theta)
+
+    def transform(self, name: str, values: FloatArray) -> FloatArray:
+        """Points as they are reported."""
+        k = self.names.index(name)
+        return np.exp(values) if k == 0 else self.nulls[k - 1] + values
+
+
+def make_target(bench: Workbench, fit: Fit) -> Target:
+    """Flat prior in ln p_m, the effects' own priors, the covariance of the fit."""
+    parameters = tuple(bench.effects[name].amplitudes[0] for name in fit.hypothesis)
+    names = ("p_m_Pa", *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)))
     centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
     sigma = np.sqrt(np.diag(fit.covariance))
     lowers = [np.linalg.cholesky(block.covariance) for block in fit.linear.blocks]
@@ -163,32 +201,66 @@ def sample_fit(
             ]
         )
 
-    quadratic = measure_residual(residual, centre, sigma)
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    parameters = [bench.effects[name].amplitudes[0] for name in fit.hypothesis]
+    bounds = [[math.log(p) for p in bench.campaign.p_m_range]]
+    bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
+    nulls = tuple(parameter.null for parameter in parameters)
+    return Target(names, nulls, parameters, measure_residual(residual, centre, sigma), np.array(bounds))
 
-    def log_probability(theta: FloatArray) -> FloatArray:
-        inside = (theta[:, 0] >= low) & (theta[:, 0] <= high)
-        total = np.where(inside, -quadratic(theta), -np.inf)
-        for k, parameter in enumerate(parameters, start=1):
-            total = total + parameter.log_prior(parameter.null + theta[:, k])
-        return total
 
-    nulls = dict(zip(names[1:], (parameter.null for parameter in parameters), strict=True))
-
-    def transform(name: str, values: FloatArray) -> FloatArray:
-        return np.exp(values) if name == "p_m_Pa" else nulls[name] + values
-
+def sample_fit(
+    bench: Workbench,
+    fit: Fit,
+    *,
+    seed: int = 1,
+    backend: Path | None = None,
+    progress: Progress | None = None,
+) -> Posterior:
+    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors."""
+    target = make_target(bench, fit)
     return sample(
-        log_probability,
-        names,
-        centre,
+        target.log_probability,
+        target.names,
+        target.misfit.centre,
         fit.covariance,
         seed=seed,
-        transform=transform,
+        transform=target.transform,
         backend=backend,
         progress=progress,
     )
+
+
+def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[float, float]:
+    """ln of the integrated likelihood by nested sampling, and its error: what Laplace's formula in Fit.evidence is checked by.
+
+    Needs dynesty (the extra ``evidence``); Speagle (2020), MNRAS 493, 3132.
+    """
+    try:
+        import dynesty
+    except ImportError:
+        raise InferenceError("", "dynesty", 'is not installed; pip install "labsim[evidence]"') from None
+    target = make_target(bench, fit)
+    low, high = target.bounds[0]
+    cut = [tuple(float(p.prior.cdf(limit)) for limit in p.limits) for p in target.parameters]
+
+    def place(cube: FloatArray) -> FloatArray:
+        point = [low + (high - low) * cube[0]]
+        for u, parameter, (below, above) in zip(cube[1:], target.parameters, cut, strict=True):
+            point.append(float(parameter.prior.ppf(below + (above - below) * u)) - parameter.null)
+        return np.array(point)
+
+    sampler = dynesty.NestedSampler(
+        lambda theta: -float(target.misfit(theta)[0]),
+        place,
+        len(target.names),
+        nlive=400,
+        rstate=np.random.default_rng(seed),
+    )
+    sampler.run_nested(dlogz=0.05, print_progress=False)
+    points = sum(block.residual.size for block in fit.linear.blocks)
+    determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.linear.blocks)
+    constant = -0.5 * (determinant + points * math.log(2 * math.pi))
+    price = sum(bench.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
+    return float(sampler.results.logz[-1]) + constant + price, float(sampler.results.logzerr[-1])
 
 
 def estimate_scatter(bench: Workbench, fit: Fit) -> tuple[float, float]:

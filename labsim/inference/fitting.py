@@ -14,11 +14,13 @@ from functools import partial
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.special import ndtr
 
-from ..effects import Effect, Instrument, Place, list_places
+from ..effects import Effect, Instrument, Parameter, Place, list_effects, list_places
+from ..effects.model import Model, apply_effects, check_model, make_instrument
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
-from ..sph import DropRun
+from ..sph import DropRun, DropSetting
 from .blocks import Block
 from .curves import encode_run
 from .forward import ResponseTable
@@ -94,6 +96,7 @@ class Workbench:
         default_factory=dict
     )  # ln of what fitting a shape beforehand costs
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
+    model: Model | None = None  # what the nominal model is extended by
 
     def _encode(
         self, number: int, index: int, variant: str, cells: int | None
@@ -193,6 +196,8 @@ class Workbench:
         made = {}
         for name, place in self.places.items():
             instrument = Instrument()
+            if self.model is not None:
+                instrument = make_instrument(self.model, place, self.effects)
             for effect_name, amplitude in amplitudes.items():
                 effect = self.effects[effect_name]
                 if effect.change_instrument is not None:
@@ -207,11 +212,18 @@ class Workbench:
         offsets = {name: 0.0 for name in self.places}
         family = self.families[0]
         setting = self.grid.setting(family, family.speeds[0], 1000.0)
-        for effect_name, amplitude in amplitudes.items():
-            if amplitude != 0.0 and self.strength_only(effect_name):
-                for name, place in self.places.items():
-                    changed = self.effects[effect_name].apply(setting, self.at(effect_name, amplitude), place)
-                    offsets[name] += math.log(changed.material.p_m / setting.material.p_m)
+        changes = [
+            (effect_name, self.at(effect_name, amplitude))
+            for effect_name, amplitude in amplitudes.items()
+            if amplitude != 0.0 and self.strength_only(effect_name)
+        ]
+        changes += (
+            [(n, dict(v)) for n, v in self.model.effects if self.strength_only(n)] if self.model else []
+        )
+        for effect_name, values in changes:
+            for name, place in self.places.items():
+                changed = self.effects[effect_name].apply(setting, values, place)
+                offsets[name] += math.log(changed.material.p_m / setting.material.p_m)
         return offsets
 
     def costs_runs(self, name: str) -> bool:
@@ -231,6 +243,7 @@ def open_workbench(
     drops: list[ObservedDrop] | None = None,
     scans: Sequence[ObservedScan] = (),
     undisturbed: Sequence[UndisturbedDust] = (),
+    model: Model | None = None,
 ) -> Workbench:
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
     drops = drops if drops is not None else observe_drops(campaign)
@@ -275,7 +288,7 @@ def open_workbench(
     if cells:
         grid.cells = cells
     places = list_places(campaign)
-    return Workbench(
+    bench = Workbench(
         campaign,
         drops,
         grid,
@@ -289,6 +302,25 @@ def open_workbench(
         scan_models,
         list(undisturbed),
     )
+    if model is not None:
+        extend(bench, model)
+    return bench
+
+
+def extend(bench: Workbench, model: Model) -> None:
+    """Take a model's effects and material into the nominal model; its p_m stays what is looked for.
+
+    Raises EffectError where one of its effects cannot be at work in this campaign.
+    """
+    check_model(model, bench.campaign, list_effects(bench.campaign), bench.campaign.folder)
+    held = [(name, values) for name, values in model.effects if not bench.strength_only(name)]
+
+    def apply(setting: DropSetting) -> DropSetting:
+        setting = setting.replace(material=setting.material.replace(**dict(model.material)))
+        return apply_effects(setting, held, bench._place(setting.projectile.tip), bench.effects)
+
+    bench.model = model
+    bench.grid.extension = apply
 
 
 def _group_scans(scans: Sequence[ObservedScan]) -> dict[tuple, list[ObservedScan]]:
@@ -362,7 +394,7 @@ def fit_hypothesis(
     if refine:
         _ask(bench, hypothesis, log_p_m, values)
     linear = linearise_at(bench, models, log_p_m, values)
-    _step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
+    step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
     solved_here = _chi_here(linear)
     n = sum(block.residual.size for block in linear.blocks)
     log_likelihood = -0.5 * (solved_here + logdet + n * math.log(2 * math.pi))
@@ -370,8 +402,9 @@ def fit_hypothesis(
         log_likelihood + 0.5 * len(names) * math.log(2 * math.pi) + 0.5 * np.linalg.slogdet(covariance)[1]
     )
     evidence -= math.log(high - low)
-    for name in hypothesis:
+    for k, name in enumerate(hypothesis, start=1):
         parameter = bench.effects[name].amplitudes[0]
+        evidence += _share_inside(parameter, values[name], float(step[k]), math.sqrt(covariance[k, k]))
         evidence += float(parameter.log_prior(parameter.null + values[name])) + bench.shape_evidence.get(
             name, 0.0
         )
@@ -387,6 +420,13 @@ def fit_hypothesis(
         linear,
         models,
     )
+
+
+def _share_inside(parameter: Parameter, amplitude: float, step: float, sigma: float) -> float:
+    """ln of what Laplace's formula must be multiplied by where a limit of the parameter cuts the Gaussian, or its top, off."""
+    low, high = ((limit - parameter.null - amplitude - step) / sigma for limit in parameter.limits)
+    inside = float(ndtr(high) - ndtr(low))
+    return 0.5 * (step / sigma) ** 2 + math.log(max(inside, 1e-300))
 
 
 def _table_number(bench: Workbench, model: DropModel) -> int:

@@ -99,6 +99,7 @@ class RunGrid:
     workers: int | None = None
     scheduler: str | None = None
     progress: Progress | None = None
+    extension: Change | None = None  # of the nominal model, by a model.toml
     runs: dict[tuple[str, int, int | None, int], list[DropRun | FailedRun]] = field(default_factory=dict)
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
@@ -107,7 +108,7 @@ class RunGrid:
         if cells is not None:
             own = max(cells, SCAN_CHANGE_CELLS) if family.is_scan else cells
         campaign, radius = self.campaign, family.projectile.tip_radius
-        return DropSetting(
+        setting = DropSetting(
             projectile=family.projectile,
             impact_speed=speed,
             material=campaign.material.replace(p_m=p_m),
@@ -118,6 +119,7 @@ class RunGrid:
             spacing=radius / own,
             after_stop=0.16,
         )
+        return setting if self.extension is None else self.extension(setting)
 
     def require(self, wanted: Sequence[Request], text: str) -> None:
         """Make sure that all runs of these requests are there."""

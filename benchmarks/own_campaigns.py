@@ -1,0 +1,199 @@
+"""Hide effects in campaigns of labsim's own solver at another spacing, and count what the diagnosis finds.
+
+    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 3] [--sigma 8,16] [--workers 2] [--drops D01,D02] [--effects a,b]
+
+Writes OUT/rows.jsonl, one line a campaign; a second call goes on where the first stopped. Prints false alarms and coverage on
+the nulls, exact and class hit rates per strength, p_m coverage with the extension, a reliability table of the probabilities.
+The strength of an effect is its amplitude times the length of its fingerprint in the nominal campaign, in standard
+deviations. OMP_NUM_THREADS=1 keeps the workers out of each other's way.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import beta, chi2
+
+from labsim.campaign import read_campaign
+from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
+from labsim.inference.runs import RunStore
+from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.records import Campaign
+
+CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
+NOT_HIDDEN = ("resolution", "planar_geometry", "gravity")  # no truth of their own here
+OFF_DEFAULT = 0.8  # hidden shapes are this share of the stated one
+
+
+def open_campaign(drops: str) -> Campaign:
+    campaign = read_campaign(CAMPAIGN)
+    chosen = [drop for drop in campaign.drops if not drops or drop.name in drops.split(",")]
+    return replace(campaign, drops=tuple(chosen))
+
+
+def judge_hidden(job: tuple[Campaign, Path | None, TruthTable, Hidden, int, float]) -> dict:
+    """Film one truth and judge it."""
+    campaign, store_at, truth, hidden, seed, strength = job
+    began = time.perf_counter()
+    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed))
+    found = judge_campaign(campaign, RunStore(store_at), workers=1, measurements=measurements)
+    names = found.screening.names
+    alike = []
+    if hidden.cause in names:
+        k = names.index(hidden.cause)
+        alike = [
+            (other, round(float(found.screening.cosines[k, j]), 3)) for j, other in enumerate(names) if j != k
+        ]
+    sigma = math.sqrt(found.best.covariance[0, 0])
+    freedom = max(found.nominal.points - 1 - 2 * len(found.bench.models), 1)
+    value = next(iter(hidden.values.values()), math.nan)
+    first = found.verdict.probabilities[0]
+    return {
+        "cause": hidden.cause,
+        "values": dict(hidden.values),
+        "strength": strength,
+        "seed": seed,
+        "p_m": hidden.p_m,
+        "log_p_m": found.best.log_p_m,
+        "log_p_m_sigma": sigma,
+        "value": value,
+        "found": {
+            name: found.bench.effects[name].amplitudes[0].null + amplitude
+            for name, amplitude in found.best.values.items()
+        },
+        "first": " + ".join(first[0]),
+        "probability": first[1],
+        "ranked": [(" + ".join(h), p) for h, p in found.verdict.probabilities],
+        "alike": alike,
+        "goodness": float(chi2.sf(found.nominal.chi_square, freedom)),
+        "p_value": found.p_value,
+        "wall": time.perf_counter() - began,
+    }
+
+
+def choose_amplitudes(
+    campaign: Campaign, store: RunStore, truth: TruthTable, sigmas: list[float], workers: int
+) -> list:
+    """(hidden, strength) of every effect at every strength that its limits allow, with alternating signs."""
+    measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
+    found = judge_campaign(campaign, store, workers=workers, measurements=measurements)
+    signal = {score.name: score.signal for score in found.screening.scores}
+    chosen = []
+    for number, (name, effect) in enumerate(sorted(found.bench.effects.items())):
+        if name in NOT_HIDDEN or name not in signal:
+            continue
+        parameter = effect.amplitudes[0]
+        for k, sigma in enumerate(sigmas):
+            size = sigma / signal[name]
+            for sign in ((-1) ** (number + k), -((-1) ** (number + k))):
+                value = parameter.null + sign * size
+                if parameter.limits[0] <= value <= parameter.limits[1]:
+                    shapes = {p.name: OFF_DEFAULT * p.null for p in effect.parameters if p.shape}
+                    chosen.append((Hidden(name, {parameter.name: value, **shapes}), sigma))
+                    break
+            else:
+                print(
+                    f"{name}: {sigma:.0f} sigma would be {size:.3g} {parameter.unit} from null, outside its limits"
+                )
+    return chosen
+
+
+def interval(hits: pd.Series) -> str:
+    """Share of True with its Clopper-Pearson interval, 95 %."""
+    of, yes = len(hits), int(hits.sum())
+    low = beta.ppf(0.025, yes, of - yes + 1) if yes else 0.0
+    high = beta.ppf(0.975, yes + 1, of - yes) if yes < of else 1.0
+    return f"{yes}/{of} = {yes / max(of, 1):.2f} [{low:.2f}, {high:.2f}]"
+
+
+def report(rows: list[dict]) -> None:
+    table = pd.DataFrame(rows)
+    table["inside"] = (table.log_p_m - np.log(table.p_m)).abs() < 1.645 * table.log_p_m_sigma
+    table["exact"] = table["first"] == table.cause
+    twins = [{other for other, cosine in alike if abs(cosine) > CONFUSABLE} for alike in table.alike]
+    table["alone"] = [not names for names in twins]
+    table["class"] = table.exact | [name in names for name, names in zip(table["first"], twins, strict=True)]
+    table["named"] = ~table["first"].isin(["none", "unknown"]) & (table.probability > 0.5)
+    nulls = table[table.cause == "none"]
+    if len(nulls):
+        print(f"nulls: not called none {interval(~nulls.exact)}; a cause above 0.5 {interval(nulls.named)}")
+        print(
+            f"  goodness of fit below 0.05 {interval(nulls.goodness < 0.05)}; p value below 0.05 {interval(nulls.p_value < 0.05)}"
+        )
+        print(f"  p_m in its 90 % interval {interval(nulls.inside)}")
+    for strength, some in table[table.cause != "none"].groupby("strength"):
+        print(f"{strength:.0f} sigma: exact {interval(some.exact)}; class {interval(some['class'])}")
+        print(f"  exact where no other is alike {interval(some.exact[some.alone])}")
+        print(
+            f"  wrong above 0.5 {interval(some.named & ~some['class'])}; p_m in its 90 % interval {interval(some.inside)}"
+        )
+        for _, row in some[~some.exact].iterrows():
+            print(f"    {row.cause} {row.value:.3g}: {[(name, round(p, 3)) for name, p in row.ranked[:3]]}")
+    print("reliability: probability of the first against how often it is true")
+    for _, some in table.groupby(pd.cut(table.probability, [0.0, 0.5, 0.8, 0.95, 0.99, 1.0])):
+        if len(some):
+            print(f"  mean {some.probability.mean():.3f}: true {interval(some.exact)}")
+    print(f"median wall {table.wall.median():.1f} s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--nulls", type=int, default=100)
+    parser.add_argument("--each", type=int, default=3)
+    parser.add_argument("--sigma", default="8,16")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--drops", default="")
+    parser.add_argument("--effects", default="")
+    parser.add_argument("--store", type=Path, default=None)
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    log = options.out / "rows.jsonl"
+    campaign, store = open_campaign(options.drops), RunStore(options.store)
+    truth = TruthTable(campaign, store, workers=options.workers)
+    truth.prepare([])
+    chosen = []
+    if options.each:
+        sigmas = [float(s) for s in options.sigma.split(",")]
+        chosen = choose_amplitudes(campaign, store, truth, sigmas, options.workers)
+        wanted = {name for name in options.effects.split(",") if name}
+        chosen = [(hidden, sigma) for hidden, sigma in chosen if not wanted or hidden.cause in wanted]
+        truth.prepare([hidden for hidden, _ in chosen])
+    truth.progress = None
+    draw = np.random.default_rng(20090101)
+    plan = [(Hidden(), 1000 + k, 0.0) for k in range(options.nulls)]
+    plan += [(h, 5000 + 100 * n + k, s) for n, (h, s) in enumerate(chosen) for k in range(options.each)]
+    done = (
+        {(r["cause"], r["seed"]) for r in map(json.loads, log.read_text().splitlines())}
+        if log.exists()
+        else set()
+    )
+    jobs = []
+    for hidden, seed, sigma in plan:
+        hidden = replace(hidden, p_m=float(np.exp(np.log(1300.0) + 0.15 * draw.standard_normal())))
+        if (hidden.cause, seed) not in done:
+            jobs.append((campaign, options.store, replace(truth, store=None), hidden, seed, sigma))
+    with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
+        for number, row in enumerate(pool.map(judge_hidden, jobs), start=1):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(
+                f"{number}/{len(jobs)} {row['cause']} {row['strength']:.0f}: {row['first']} {row['probability']:.2f}",
+                flush=True,
+            )
+    report([json.loads(line) for line in log.read_text().splitlines()])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,215 @@
+"""Campaigns whose truth is known: labsim's own solver at another spacing, other nodes, with every nuisance a laboratory has.
+
+Tracks come from runs at TRUTH_CELLS spacings a radius on nodes of speed and p_m of their own; each drop gets a camera that
+starts at its own instant, a height that is not quite the stated one, a sample of its own strength, a surface row that is
+off within its uncertainty, noise, missing frames and outliers. Scans are given as what their undisturbed dust shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..effects import Effect, Instrument, list_effects, list_places
+from ..errors import SimulationError
+from ..records import Campaign, Drop, FloatArray, Projectile, Track
+from ..sph import DropRun, DropSetting
+from ..sph.particles import initial_filling_factor
+from .curves import encode_run
+from .forward import Instant, ResponseTable, predict_depth
+from .grid import interpolation_weights
+from .measure import Measurements
+from .observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
+from .runs import Progress, RunStore
+from .undisturbed import UndisturbedDust
+
+TRUTH_CELLS = 6
+SPEED_ANCHOR, SPEED_RATIO = 0.13, 1.6
+STRENGTHS = (850.0, 1300.0, 2000.0)  # Pa, nodes of the truth
+SCATTER = 0.02  # of ln p_m from sample to sample
+OUTLIERS, MISSING = 0.01, 0.01  # shares of frames
+AFTER_STOP = 1.1  # frames kept, in stopping times
+ROW_NOISE = 1.5e-4  # of the filling factor of a row of undisturbed dust
+ROW_STEP, ROW_DEPTH = 8e-5, 3.3e-3  # m
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What is put into a campaign. values : of the parameters of the effect called ``cause``; "none" has none."""
+
+    cause: str = "none"
+    values: Mapping[str, float] = field(default_factory=dict)
+    p_m: float = 1300.0
+
+
+@dataclass
+class TruthTable:
+    """Runs that truths are made of: nominal ones on all nodes, and one hidden effect's at the middle strength."""
+
+    campaign: Campaign
+    store: RunStore
+    workers: int | None = None
+    progress: Progress | None = None
+    tables: dict[Projectile, ResponseTable] = field(default_factory=dict)
+
+    def prepare(self, hidden: Sequence[Hidden]) -> None:
+        """All runs that these truths need, in one sweep."""
+        jobs: list[tuple[Projectile, str, float]] = []
+        settings: list[DropSetting] = []
+        for projectile, speeds in self._families().items():
+            for name, effect_values, strength in self._variants(hidden):
+                jobs.append((projectile, name, strength))
+                for speed in speeds:
+                    setting = self.setting(projectile, speed, strength)
+                    settings.append(self._apply(name.split(" ")[0], effect_values, setting))
+        runs = self.store.get_many(settings, workers=self.workers, progress=self.progress, text="truths")
+        codes: dict[tuple[Projectile, str, float], FloatArray] = {}
+        at = 0
+        for projectile, name, strength in jobs:
+            count = len(self._families()[projectile])
+            part = runs[at : at + count]
+            at += count
+            if all(isinstance(run, DropRun) and run.stopped for run in part):
+                codes[projectile, name, strength] = np.array([encode_run(run) for run in part])
+        for projectile, speeds in self._families().items():
+            table = ResponseTable(np.log(speeds), tuple(range(len(speeds))))
+            for k, strength in enumerate(STRENGTHS):
+                table.base[k] = codes[projectile, "", strength]
+            for found, name, strength in codes:
+                if found == projectile and name:
+                    table.changes[name] = {1: {1.0: codes[found, name, strength] - table.base[1]}}
+            self.tables[projectile] = table
+
+    def code(self, hidden: Hidden, projectile: Projectile, log_p_m: float, log_speed: float) -> FloatArray:
+        """Code of one drop of a truth."""
+        table = self.tables[_bare(projectile)]
+        weights = interpolation_weights(np.log(STRENGTHS), log_p_m)
+        across = interpolation_weights(table.log_speeds, log_speed)
+        code = sum(w * (across @ table.base[k]) for k, w in enumerate(weights))
+        name = _variant(hidden)
+        if name in table.changes:
+            code = code + across @ table.changes[name][1][1.0]
+        elif name and self._costs_runs(hidden):
+            raise SimulationError("simulation", "truth", f"{name} has no runs; prepare it, or it failed")
+        return np.asarray(code)
+
+    def _families(self) -> dict[Projectile, tuple[float, ...]]:
+        speeds: dict[Projectile, list[float]] = {}
+        for drop in self.campaign.drops:
+            assert drop.height is not None
+            fall = math.sqrt(2 * STANDARD_GRAVITY * drop.height.value)
+            slack = 1 + 1.5 * drop.height.sigma / drop.height.value
+            speeds.setdefault(_bare(drop.projectile), []).extend([fall * slack, fall / slack])
+        return {p: _own_nodes(min(v), max(v)) for p, v in speeds.items()}
+
+    def _variants(self, hidden: Sequence[Hidden]) -> list[tuple[str, Mapping[str, float], float]]:
+        plain: list[tuple[str, Mapping[str, float], float]] = [("", {}, strength) for strength in STRENGTHS]
+        named = {_variant(each): each.values for each in hidden if self._costs_runs(each)}
+        return plain + [(name, values, STRENGTHS[1]) for name, values in named.items()]
+
+    def _costs_runs(self, hidden: Hidden) -> bool:
+        return hidden.cause not in ("none", "sample_drift") and self.effect(hidden.cause).costs_runs
+
+    def effect(self, name: str) -> Effect:
+        return list_effects(self.campaign.folder)[name].for_campaign(self.campaign)
+
+    def setting(self, projectile: Projectile, speed: float, p_m: float) -> DropSetting:
+        campaign = self.campaign
+        return DropSetting(
+            projectile=projectile,
+            impact_speed=speed,
+            material=campaign.material.replace(p_m=p_m),
+            filling_factor=campaign.sample.filling_factor,
+            monomer_density=campaign.sample.monomer_density,
+            gravity=campaign.gravity,
+            geometry=campaign.geometry,
+            spacing=projectile.tip_radius / TRUTH_CELLS,
+            after_stop=0.16,
+        )
+
+    def _apply(self, name: str, values: Mapping[str, float], setting: DropSetting) -> DropSetting:
+        if not name:
+            return setting
+        place = next(iter(list_places(self.campaign).values()))
+        return self.effect(name).apply(setting, values, place)
+
+
+def _variant(hidden: Hidden) -> str:
+    if hidden.cause == "none":
+        return ""
+    return hidden.cause + " " + " ".join(f"{key}={value:.6g}" for key, value in sorted(hidden.values.items()))
+
+
+def _bare(projectile: Projectile) -> Projectile:
+    return Projectile(projectile.tip, projectile.tip_radius, projectile.mass)
+
+
+def _own_nodes(slowest: float, fastest: float) -> tuple[float, ...]:
+    first = math.floor(math.log(slowest / SPEED_ANCHOR) / math.log(SPEED_RATIO))
+    last = max(math.ceil(math.log(fastest / SPEED_ANCHOR) / math.log(SPEED_RATIO)), first + 2)
+    return tuple(SPEED_ANCHOR * SPEED_RATIO**k for k in range(first, last + 1))
+
+
+def measure_hidden(
+    truth: TruthTable, hidden: Hidden, rng: np.random.Generator, scans: int = 2
+) -> Measurements:
+    """What the cameras and the scanner would have recorded of a truth. Raises SimulationError where its runs are missing."""
+    campaign = truth.campaign
+    effect = None if hidden.cause == "none" else truth.effect(hidden.cause)
+    places, fractions = list_places(campaign), sequence_fractions(campaign.drops)
+    drops = []
+    for drop in campaign.drops:
+        instrument, shift = Instrument(), SCATTER * rng.standard_normal()
+        if effect is not None:
+            instrument = effect.apply_to_instrument(instrument, hidden.values, places[drop.name])
+            if hidden.cause == "sample_drift":
+                plain = truth.setting(_bare(drop.projectile), 0.5, hidden.p_m)
+                changed = effect.apply(plain, hidden.values, places[drop.name])
+                shift += math.log(changed.material.p_m / hidden.p_m)
+        track = _film(truth, hidden, drop, instrument, math.log(hidden.p_m) + shift, rng)
+        drops.append(observe_drop(drop, track, fractions[drop.name]))
+    dust = []
+    for scan in campaign.scans[:scans]:
+        depth = np.arange(2 * ROW_STEP, ROW_DEPTH, ROW_STEP)
+        setting, instrument = truth.setting(_bare(scan.projectile), 0.5, hidden.p_m), Instrument()
+        if effect is not None:
+            setting = effect.apply(setting, hidden.values, places[scan.name])
+            instrument = effect.apply_to_instrument(instrument, hidden.values, places[scan.name])
+        level = instrument.stated_filling_factor(initial_filling_factor(setting, depth))
+        seen = level + ROW_NOISE * rng.standard_normal(depth.size)
+        spread = math.hypot(scan.voxel * math.exp(0.1 * rng.standard_normal()), instrument.ct_blur)
+        dust.append(UndisturbedDust(scan, depth, seen, np.full(depth.size, ROW_NOISE), spread))
+    return Measurements(drops, dust=dust)
+
+
+def _film(
+    truth: TruthTable,
+    hidden: Hidden,
+    drop: Drop,
+    instrument: Instrument,
+    log_p_m: float,
+    rng: np.random.Generator,
+) -> Track:
+    camera, height = drop.camera, drop.height
+    assert camera is not None and height is not None
+    true_height = max(height.value + height.sigma * rng.standard_normal(), 0.4 * height.value)
+    speed = math.sqrt(2 * STANDARD_GRAVITY * true_height) * (1 + 0.002 * rng.standard_normal())
+    code = truth.code(hidden, drop.projectile, log_p_m, math.log(speed))
+    contact = rng.uniform(3e-3, 4e-3)
+    end = (contact + AFTER_STOP * math.exp(code[1])) * instrument.rate_factor
+    frames = np.arange(int(end * camera.frame_rate))
+    time = frames / camera.frame_rate
+    row_error = camera.surface_row_sigma * rng.standard_normal()
+    instant = Instant(contact, math.log(speed), row_error * camera.pixel_size)
+    offset = instrument.row_offset_px * camera.pixel_size
+    depth = predict_depth(code, time, instant, instrument.pixel_factor, instrument.rate_factor, offset)
+    sigma = drop.record.row_sigma or 0.08
+    row = camera.surface_row + depth / camera.pixel_size + sigma * rng.standard_normal(frames.size)
+    row = np.where(rng.random(frames.size) < OUTLIERS, row + rng.uniform(-20, 20, frames.size), row)
+    keep = rng.random(frames.size) >= MISSING
+    frames, time, row = frames[keep], time[keep], row[keep]
+    n = frames.size
+    return Track(frames, time, row, np.full(n, sigma), np.ones(n, dtype=bool), ("",) * n)
