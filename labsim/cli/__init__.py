@@ -20,7 +20,7 @@ import typer
 
 from .. import __version__
 from ..errors import LabsimError
-from . import _provenance
+from . import _provenance, options
 
 NOT_COMMANDS = {"options", "measured"}  # shared by commands
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -97,8 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (
         OSError
     ) as trouble:  # of the machine, not of the input: no room, no right to write, a disk that is gone
-        reason = trouble.strerror or str(trouble)
-        status = _complain(f"{trouble.filename or 'disk'}: {reason}; mend that and start again", 2)
+        place = trouble.filename or options.output_folder() or "disk"
+        status = _complain(f"{place}: {trouble.strerror or trouble}; mend that and start again", 2)
     except MemoryError:
         status = _complain("memory: is not enough; use fewer --workers or smaller input", 2)
     except _UsageTrouble as trouble:

@@ -60,7 +60,16 @@ def make_output_folder(out: Path | None, source: Path, command: str) -> Path:
         raise LabsimError(
             out, "--out", f"cannot be made ({trouble.strerror}); name a folder you may write to"
         ) from None
+    _output[:] = [out]
     return out
+
+
+_output: list[Path] = []
+
+
+def output_folder() -> Path | None:
+    """The folder that this command writes to, once it has made it."""
+    return _output[-1] if _output else None
 
 
 def write_json(path: Path, summary: dict[str, Any], item: str | None = None) -> Path:
