@@ -1,0 +1,140 @@
+"""The recipes of docs/extend.md, taken from the page and put where their first line says: each works as printed."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import labsim.cli
+import labsim.ct.formats
+import labsim.tracks
+import labsim.video.formats
+from labsim.campaign import read_campaign
+from labsim.ct import open_stack
+from labsim.effects import list_effects, list_places
+from labsim.records import Camera, Material, Projectile
+from labsim.sph import DropSetting, check_setting
+from labsim.tracks import read_rows
+from labsim.video import open_frames
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = {
+    "labsim/tracks": labsim.tracks,
+    "labsim/video/formats": labsim.video.formats,
+    "labsim/ct/formats": labsim.ct.formats,
+    "labsim/cli": labsim.cli,
+}
+
+
+def find_recipes() -> dict[str, str]:
+    """Path in the first line -> the text of every block of the page."""
+    blocks = re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs/extend.md").read_text(encoding="utf-8"), re.DOTALL
+    )
+    return {block.splitlines()[0].removeprefix("# "): block for block in blocks}
+
+
+RECIPES = find_recipes()
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Path:
+    folder = tmp_path / "campaign"
+    shutil.copytree(ROOT / "data/campaigns/p01", folder)
+    return folder
+
+
+@pytest.fixture
+def put(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Put a recipe into a folder that counts as part of its package."""
+
+    def place(name: str) -> None:
+        folder, file = name.rsplit("/", 1)
+        (tmp_path / "added").mkdir()
+        (tmp_path / "added" / file).write_text(RECIPES[name], encoding="utf-8")
+        monkeypatch.setattr(
+            PACKAGES[folder], "__path__", [*PACKAGES[folder].__path__, str(tmp_path / "added")]
+        )
+
+    return place
+
+
+def test_every_recipe_is_tried_here() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert len(RECIPES) >= 6
+    for name in RECIPES:
+        assert name.rsplit("/", 1)[1].removesuffix(".py") in text, name
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "field"),
+    [("added_mass", "mass", "projectile"), ("strength_bend", "bend", "strength_shape")],
+)
+def test_an_effect_of_the_campaign(name: str, key: str, field: str, campaign: Path) -> None:
+    (campaign / "effects").mkdir()
+    (campaign / "effects" / f"{name}.py").write_text(RECIPES[f"CAMPAIGN/effects/{name}.py"], encoding="utf-8")
+    read = read_campaign(campaign)
+    effect = list_effects(read)[name]
+    place = next(iter(list_places(read).values()))
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.6, Material())
+    assert effect.apply(setting, {key: 0.0}, place) == setting
+    changed = effect.apply(setting, {key: effect.amplitudes[0].step}, place)
+    assert getattr(changed, field) != getattr(setting, field)
+    check_setting(changed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "value"), [("added_mass", {"mass": 4e-7}), ("strength_bend", {"bend": 2.0})]
+)
+def test_an_effect_does_what_it_expects(name: str, value: dict, campaign: Path, tmp_path: Path) -> None:
+    """Simulated with and without: the depth moves to the side that the file says."""
+    (campaign / "effects").mkdir()
+    (campaign / "effects" / f"{name}.py").write_text(RECIPES[f"CAMPAIGN/effects/{name}.py"], encoding="utf-8")
+    read = read_campaign(campaign)
+    effect = list_effects(read)[name]
+    place = next(iter(list_places(read).values()))
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.6, Material(p_m=2000.0), spacing=1.25e-4)
+    plain, changed = labsim.simulate(
+        [setting, effect.apply(setting, value, place)], store=tmp_path, workers=1
+    )
+    assert np.sign(changed.penetration_depth - plain.penetration_depth) == effect.expect["penetration_depth"]
+
+
+def test_a_format_of_tracks(put, tmp_path: Path) -> None:
+    put("labsim/tracks/imagej_results.py")
+    path = tmp_path / "Results.csv"
+    path.write_text(" ,Slice,X,Y\n" + "".join(f"{k},{k},64,{280 + 2.5 * k}\n" for k in range(1, 21)))
+    rows = read_rows(path, Camera(1e4, 2e-5, 300.0, 0.1))
+    assert list(rows.frame) == list(range(20)) and rows.row[0] == 282.5
+
+
+def test_a_format_of_videos(put, tmp_path: Path) -> None:
+    put("labsim/video/formats/numpy_stack.py")
+    stack = np.arange(3 * 8 * 6, dtype=np.uint8).reshape(3, 8, 6)
+    np.save(tmp_path / "film.npy", stack)
+    frames = open_frames(tmp_path / "film.npy")
+    assert len(frames) == 3 and frames.shape == (8, 6)
+    assert np.array_equal(np.stack(list(frames)), stack)
+
+
+def test_a_format_of_slices(put, tmp_path: Path) -> None:
+    put("labsim/ct/formats/numpy_volume.py")
+    volume = np.arange(9 * 5 * 4, dtype=np.uint16).reshape(9, 5, 4)
+    np.save(tmp_path / "volume.npy", volume)
+    stack = open_stack(tmp_path / "volume.npy")
+    assert stack.count == 9 and np.array_equal(stack.slice(4), volume[4])
+
+
+def test_a_command(put, campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put("labsim/cli/speeds.py")
+    with pytest.raises(SystemExit) as left:
+        labsim.cli.main(["speeds", str(campaign), "--json"])
+    assert left.value.code == 0
+    speeds = json.loads(capsys.readouterr().out)["speeds_m_s"]
+    assert speeds["D05"] == pytest.approx(0.6407, abs=1e-3)
