@@ -178,7 +178,13 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
         return []
     top = screening.scores[0].log_bayes
     close = [score for score in screening.scores if score.log_bayes > max(top - CLOSE, WORTHWHILE)]
-    costly = [score for score in close if bench.costs_runs(score.name)][:MOST_RERUN]
+    costly = [
+        score
+        for score in close
+        if bench.costs_runs(score.name)
+        # finer runs for a suspicion of coarseness only where nothing else explains as much
+        and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
+    ][:MOST_RERUN]
     free = [score for score in screening.scores if not bench.costs_runs(score.name)]
     fits = []
     for score in [*free, *costly]:

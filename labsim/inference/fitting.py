@@ -510,7 +510,7 @@ def amplitude_nodes(bench: Workbench, name: str, amplitude: float) -> list[float
     parameter = bench.effects[name].amplitudes[0]
     step, (low, high) = parameter.step, parameter.limits
     place = amplitude / step
-    if abs(place) <= 1.0:
+    if abs(place) <= 1.0 or bench.effects[name].kind == "numerics":  # much finer runs would cost more than they say
         wanted = [1.0 if place >= 0 else -1.0]
     else:
         ladder = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
