@@ -186,12 +186,12 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
         words.append(
             "The undisturbed dust below and beside the beads is compared with the stated filling factor."
         )
-    scans = []
+    rows: list[list[dict[str, str]]] = []
     for k, view in enumerate(maps):
         dense = float(np.nanmax(view.measured)) if np.isfinite(view.measured).any() else float("nan")
         panels = [
             {
-                "title": "φ measured",
+                "title": f"{view.name}: φ measured",
                 "figure": f"map{k}",
                 "text": f"Undisturbed φ {view.undisturbed:.4f}, up to {show_number(dense)} beside the bead, whose tip lies "
                 f"{view.map.tip_depth * 1e3:.2f} mm deep.",
@@ -200,19 +200,21 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
         for q, name in enumerate(view.simulated):
             panels.append(
                 {
-                    "title": f"φ simulated, {name}",
+                    "title": f"{view.name}: φ simulated, {name}",
                     "figure": f"map{k}_simulated{q}",
                     "text": "On the compared cells.",
                 }
             )
             panels.append(
                 {
-                    "title": f"measured − {name}",
+                    "title": f"{view.name}: measured − {name}",
                     "figure": f"map{k}_left{q}",
-                    "text": f"Rms {view.rms(name):.4f}; blue is denser than simulated.",
+                    "text": f"Rms {view.rms(name):.4f}; red is denser than simulated.",
                 }
             )  # fmt: skip
-        scans.append({"name": view.name, "panels": panels})
+        rows.append(panels)
+    if not compared:  # one map a scan: side by side
+        rows = [[panel for row in rows for panel in row]]
     undisturbed = ""
     if bench.undisturbed:
         means = [f"{dust.name} {np.mean(dust.filling_factor):.4f}" for dust in bench.undisturbed]
@@ -221,7 +223,7 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
             f"Filling factor of dust that no bead reached, against depth, in the mean {', '.join(means)}; "
             f"stated are {sample.filling_factor:g} ± {sample.filling_factor_sigma:g} (band: two standard deviations)."
         )
-    return {"words": " ".join(words), "scans": scans, "undisturbed": undisturbed}
+    return {"words": " ".join(words), "rows": rows, "undisturbed": undisturbed}
 
 
 def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:

@@ -185,7 +185,10 @@ def plot_map(view: MapView, values: FloatArray, *, difference: bool = False) -> 
     layout = {
         "height": 390,
         "margin": MARGIN | {"r": 4, "t": 10},
-        "xaxis": {"title": {"text": "r (mm)"}, "constrain": "domain", "constraintoward": "right", "showgrid": False},
+        "xaxis": {
+            "title": {"text": "r (mm)"}, "constrain": "domain", "constraintoward": "right", "showgrid": False,
+            "zeroline": False,
+        },
         "yaxis": {"title": {"text": "z (mm)"}, "scaleanchor": "x", "constrain": "domain", "showgrid": False},
         "shapes": [
             {

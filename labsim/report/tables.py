@@ -72,19 +72,26 @@ def diagnosis_lines(diagnosis: SummaryDiagnosis) -> str:
             f"  {row.name:26s}{value_text(row, 'observed'):>22s}{value_text(row, 'predicted'):>22s}"
             f"{row.deviation:>+10.1f} σ  {mark}"
         )
-    if (scaling := diagnosis.scaling) is not None:
-        small, large = 2e3 * scaling.small, 2e3 * scaling.large
-        lines += [
-            "",
-            f"  T_s({large:g} mm)/T_s({small:g} mm): published {scaling.observed:.2f} ± {scaling.observed_sigma:.2f}; simulation "
-            f"{scaling.ratio_equal_speed:.2f} at {scaling.speed:.2f} m/s for both, "
-            f"{scaling.ratio_equal_momentum:.2f} ± {scaling.ratio_equal_momentum_sigma:.2f} at equal m v/A",
-        ]
-    if diagnosis.exponents:
-        found = ", ".join(f"{n:.2f} ± {s:.2f} ({2e3 * r:g} mm)" for r, (n, s) in diagnosis.exponents.items())
-        lines.append(f"  D ∝ (m v/A)^n: published n = 1; simulation {found}")
+    if further := scaling_lines(diagnosis):
+        lines += ["", *(f"  {line}" for line in further)]
     lines += ["", verdict_text(diagnosis)]
     return "\n".join(lines + warning_lines(diagnosis.warnings))
+
+
+def scaling_lines(diagnosis: SummaryDiagnosis) -> list[str]:
+    """How depth and stopping time scale with size and speed, beside what is published."""
+    lines = []
+    if (scaling := diagnosis.scaling) is not None:
+        small, large = 2e3 * scaling.small, 2e3 * scaling.large
+        lines.append(
+            f"T_s({large:g} mm)/T_s({small:g} mm): published {scaling.observed:.2f} ± {scaling.observed_sigma:.2f}; simulation "
+            f"{scaling.ratio_equal_speed:.2f} at {scaling.speed:.2f} m/s for both, "
+            f"{scaling.ratio_equal_momentum:.2f} ± {scaling.ratio_equal_momentum_sigma:.2f} at equal m v/A"
+        )
+    if diagnosis.exponents:
+        found = ", ".join(f"{n:.2f} ± {s:.2f} ({2e3 * r:g} mm)" for r, (n, s) in diagnosis.exponents.items())
+        lines.append(f"D ∝ (m v/A)^n: published n = 1; simulation {found}")
+    return lines
 
 
 def verdict_text(diagnosis: SummaryDiagnosis) -> str:

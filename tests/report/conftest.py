@@ -1,0 +1,127 @@
+"""Reports of made-up campaigns: the diagnosis is real, only the runs obey a law in closed form (laws.py)."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from labsim.campaign import read_campaign
+from labsim.cli.diagnose import write_diagnosis
+from labsim.cli.measured import write_measured_calibration, write_measured_diagnosis
+from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
+from labsim.diagnosis.judge import Verdict
+from labsim.diagnosis.summary import diagnose_summary
+from labsim.inference.calibrate import calibrate
+from labsim.inference.summary import calibrate_summary
+
+SEED = Path(__file__).parents[2] / "data" / "guettler2009"
+HOSTILE = "<script>document.title='ran'</script>"
+
+spec = importlib.util.spec_from_file_location("laws", Path(__file__).with_name("laws.py"))
+assert spec is not None and spec.loader is not None
+laws = importlib.util.module_from_spec(spec)
+sys.modules["laws"] = laws
+spec.loader.exec_module(laws)
+
+
+@pytest.fixture(scope="session")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("reports")
+
+
+def write(found: Diagnosis, folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
+    write_measured_diagnosis(found, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def effect_found(place: Path) -> Diagnosis:
+    """Strength that grows with the rate of compression; its name tries to run a script."""
+    folder = laws.write_campaign(place / "campaign-effect", rate=0.05, name=HOSTILE, description=HOSTILE)
+    return diagnose_campaign(read_campaign(folder), laws.LawStore(place / "store"), workers=1)
+
+
+@pytest.fixture(scope="session")
+def effect(effect_found: Diagnosis, place: Path) -> Path:
+    return write(effect_found, place / "effect")
+
+
+@pytest.fixture(scope="session")
+def none(effect_found: Diagnosis, place: Path) -> Path:
+    """The same drops, written down as a diagnosis that found nothing writes them: one model, no gain."""
+    found = dataclasses.replace(
+        effect_found,
+        best=effect_found.nominal,
+        verdict=Verdict("none", [(("none",), 0.97), (("unknown",), 0.03)]),
+        posterior_extended=effect_found.posterior_nominal,
+        held_out_extended=effect_found.held_out_nominal,
+        confusable=[],
+        p_value=0.6,
+    )
+    return write(found, place / "none")
+
+
+@pytest.fixture(scope="session")
+def unknown(place: Path) -> Path:
+    """Every other drop 6 % deeper than any law; with a scan, which enters the likelihood, and a second one that is left out."""
+    folder = laws.write_campaign(place / "campaign-unknown", odd=0.06, scan=True)
+    campaign = read_campaign(folder)
+    found = diagnose_campaign(campaign, laws.LawStore(place / "store"), workers=1, use_scans=True)
+    lost = dataclasses.replace(campaign.scans[0], name="C02", slices=folder / "nowhere")
+    return write(
+        dataclasses.replace(
+            found,
+            campaign=dataclasses.replace(campaign, scans=(*campaign.scans, lost)),
+            warnings=(*found.warnings, "scan C02 left out: it holds no bead & <b>nothing</b> else"),
+        ),
+        place / "unknown",
+    )
+
+
+@pytest.fixture(scope="session")
+def calibrated(place: Path) -> Path:
+    """A calibration of a single drop."""
+    campaign = read_campaign(laws.write_campaign(place / "campaign-one", drops=laws.DROPS[2:3]))
+    folder = place / "calibrated"
+    folder.mkdir()
+    write_measured_calibration(calibrate(campaign, store=laws.LawStore(place / "store")), folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def published(place: Path) -> Path:
+    """Published figures with runs of the law instead of the solver's."""
+    store = laws.LawStore(place / "store")
+    calibration = calibrate_summary(read_campaign(SEED), store, workers=1)
+    folder = place / "published"
+    folder.mkdir()
+    write_diagnosis(diagnose_summary(calibration, store, workers=1), folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium of the system, driven by Playwright; the test is skipped where either is missing."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    named = os.environ.get("LABSIM_CHROMIUM")
+    chromium = (
+        named or shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    )
+    if chromium is None:
+        pytest.skip("no Chromium here (Debian: apt install chromium; or name it in LABSIM_CHROMIUM)")
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+def load(folder: Path, name: str) -> dict:
+    return json.loads((folder / name).read_text())
