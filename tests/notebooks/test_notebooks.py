@@ -1,0 +1,63 @@
+"""The notebooks run from top to bottom, show what they promise, and are kept without outputs."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+from pathlib import Path
+
+import cv2
+import nbformat
+import numpy as np
+import pytest
+from nbclient import NotebookClient
+
+FOLDER = Path(__file__).parents[2] / "notebooks"
+LONGEST = 900  # s for one cell on a loaded machine; docs/performance.md has what they take
+# name -> (pictures, what the printed text must hold)
+NOTEBOOKS = {
+    "track_projectile": (3, [r"impact speed +0\.62\d", r"true over stated frame rate .*0\.9[45]"]),
+    "density_contour": (
+        4,
+        [r"undisturbed dust 0\.1[45]", r"denser than 0\.20: 0\.\d+ ± 0\.\d+ sphere volumes"],
+    ),
+    "calibrate_p_m": (3, [r"p_m = 1[12]\d\d Pa", r"\d+ runs new"]),
+    "find_the_cause": (3, [r"verdict: effect", r"pixel_scale +(1|0\.9\d*)\n"]),
+}
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return os.environ.get("LABSIM_STORE") or str(tmp_path_factory.mktemp("store"))
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
+def test_kept_small_and_without_outputs(path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    assert path.stat().st_size <= 1_000_000
+    assert notebook.cells[0].cell_type == "markdown" and notebook.cells[0].source.startswith("# ")
+    if path.stem in NOTEBOOKS:
+        assert all(not cell.get("outputs") and cell.get("execution_count") is None for cell in notebook.cells)
+
+
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_runs_and_shows_what_it_promises(name: str, store: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LABSIM_STORE", store)
+    notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
+    NotebookClient(
+        notebook, timeout=LONGEST, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
+    ).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    pictures = [o["data"]["image/png"] for o in outputs if "image/png" in o.get("data", {})]
+    count, promises = NOTEBOOKS[name]
+    assert len(pictures) == count
+    for picture in pictures:
+        pixels = cv2.imdecode(np.frombuffer(base64.b64decode(picture), np.uint8), cv2.IMREAD_GRAYSCALE)
+        assert pixels.shape[0] > 150 and pixels.std() > 5, "an empty figure"
+    printed = "".join(o.text for o in outputs if o.output_type == "stream" and o.name == "stdout")
+    for promise in promises:
+        assert re.search(promise, printed), printed
+    complaints = "".join(o.text for o in outputs if o.output_type == "stream" and o.name == "stderr")
+    assert "Warning" not in complaints, complaints
