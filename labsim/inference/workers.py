@@ -69,25 +69,30 @@ def open_executor(
         with _open_dask(scheduler) as pair:
             yield pair
         return
-    count = min(workers or count_cores(), wanted)
-    if count <= 1:
+    count = workers or count_cores()
+    if min(count, wanted) <= 1:
         yield InProcess(), 1
         return
-    if compile_first:
-        warm_up()  # once here, or every worker would
-    pool = ProcessPoolExecutor(
-        max_workers=count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker
-    )
+    pool = _pools.get(count)
+    if pool is None:
+        if compile_first:
+            warm_up()  # once here, or every worker would
+        pool = ProcessPoolExecutor(
+            max_workers=count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker
+        )
+        _pools[count] = pool
     try:
         yield pool, count
     except BaseException:
+        _pools.pop(count, None)
         workers_now = list((pool._processes or {}).values())  # shutdown forgets them
         pool.shutdown(wait=False, cancel_futures=True)
         for process in workers_now:
             process.terminate()  # a run of minutes is not waited for when the user stops
         raise
-    else:
-        pool.shutdown()
+
+
+_pools: dict[int, ProcessPoolExecutor] = {}  # kept from sweep to sweep: a fit asks for many small ones
 
 
 def warm_up() -> None:
