@@ -1,0 +1,56 @@
+"""The documentation builds without a warning, and what it points to is there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("mkdocstrings")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    pages = {path.stem for path in (tmp_path / "site").glob("*.html")}
+    assert {path.stem for path in (ROOT / "docs").glob("*.md")} <= pages
+    api = (tmp_path / "site/api.html").read_text(encoding="utf-8")
+    for name in ("track", "reduce_scan", "simulate", "calibrate", "diagnose", "tabulate"):
+        assert f'id="labsim.api.{name}"' in api
+
+
+def test_files_named_in_the_documentation_are_there() -> None:
+    """Every path in backticks that begins with a folder of the repository."""
+    missing = []
+    for page in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]:
+        if page.name == "CHANGELOG.md":
+            continue
+        for name in re.findall(
+            r"`((?:labsim|tests|data|docs|benchmarks|notebooks)/[\w./-]+)`", page.read_text(encoding="utf-8")
+        ):
+            if not (ROOT / name).exists():
+                missing.append(f"{page.name}: {name}")
+    recipes = set(
+        re.findall(r"^# (labsim/\S+)", (ROOT / "docs/extend.md").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    assert not [text for text in missing if text.split(": ")[1] not in recipes]
+
+
+def test_the_citation_is_complete() -> None:
+    yaml = pytest.importorskip("yaml")
+    import labsim
+
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0" and citation["version"] == labsim.__version__
+    assert {"message", "title", "authors", "license", "references"} <= set(citation)
