@@ -56,9 +56,9 @@ class CommandFolder(typer.core.TyperGroup):
 
 app = typer.Typer(
     cls=CommandFolder,
-    help="Laboratory drops into porous dust, linked to an SPH simulation: what does the simulation get wrong?",
+    help="Laboratory drops into porous dust: what does their SPH simulation get wrong?",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )

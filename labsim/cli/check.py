@@ -1,7 +1,8 @@
-"""``labsim check``: read everything, say what is there and what is wrong."""
+"""``labsim check``: read everything, say what is there, what is missing and what looks odd."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,32 @@ def check(
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:
-    """Read a campaign whole, say what is there and what is wrong."""
-    summary = describe_campaign(read_campaign(campaign))
+    """Say what is in a campaign, what is missing and what looks odd."""
+    read = read_campaign(campaign)
+    summary = describe_campaign(read)
+    from ._inspect import (
+        inspect_campaign,
+        list_missing,
+    )  # tracks and scans need heavy libraries, mistakes do not
+
+    with options.show_progress(quiet or as_json or not sys.stderr.isatty()) as progress:
+        drops, scans, scales = inspect_campaign(read, progress)
+    missing = list_missing(read)
+    odd = scales + [f"{found.name}: {text}" for found in (*drops, *scans) for text in found.odd]
+    wide = max((len(found.name) for found in (*drops, *scans)), default=0)
+    head, verdict = summary["text"].rsplit("\n", 1)
+    lines = [head, "there:"]
+    lines += [f"  {found.name:{wide}}  {found.line}" for found in (*drops, *scans)]
+    if missing:
+        lines += ["missing:", *(f"  {line}" for line in missing)]
+    if odd:
+        lines += ["odd:", *(f"  {line}" for line in odd)]
+    said = f"{len(odd)} thing{'s look' if len(odd) > 1 else ' looks'} odd" if odd else "nothing looks odd"
+    lines.append(f"{verdict}; {said}")
+    summary |= {
+        "text": "\n".join(lines),
+        "measured": {found.name: found.numbers for found in (*drops, *scans)},
+        "missing": missing,
+        "warnings": odd,
+    }
     options.finish(summary, summary["text"], as_json=as_json, quiet=quiet)

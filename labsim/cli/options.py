@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -107,14 +108,34 @@ def _finite(value: Any) -> Any:
 
 
 class Progress(Protocol):
-    """What long work calls: ``progress(done, total, text)``, as often as it likes, in any unit of work."""
+    """What long work calls: ``progress(done, total, text)``, as often as it likes, in any unit of work.
+
+    A text is a stage. One that ends in ", N new" announces N runs; each further call is one run done.
+    """
 
     def __call__(self, done: float, total: float, text: str) -> None: ...
 
 
+class _Stage:
+    """Where one stage of the work is, in the words of people."""
+
+    def __init__(self, text: str) -> None:
+        found = re.fullmatch(r"(.*), (\d+) new", text)
+        self.name, self.runs = (found[1], int(found[2])) if found else (text, 0)
+        self.calls = 0
+        self.done = False
+
+    def tell(self, done: float, total: float) -> str:
+        """Name of the stage, and the runs that are done of all where it consists of runs."""
+        self.calls += 1
+        if not self.runs:
+            return self.name
+        return f"{self.name}, {min(self.calls - 1, self.runs) if done < total else self.runs} of {self.runs} runs"
+
+
 @contextmanager
 def show_progress(quiet: bool) -> Iterator[Progress]:
-    """A bar with the time left on a terminal, a line every ten seconds elsewhere (standard error both)."""
+    """A bar a stage with the time left on a terminal; elsewhere plain lines, one now and then (standard error both)."""
     if quiet:
         yield lambda done, total, text: None
     elif sys.stderr.isatty():
@@ -129,20 +150,21 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
         from rich.progress import Progress as Bars
 
         columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=24),
             TaskProgressColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
         )
         with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-            tasks: dict[str, Any] = {}
+            stages: dict[str, tuple[_Stage, Any]] = {}
 
             def report(done: float, total: float, text: str) -> None:
-                if text not in tasks:
-                    tasks[text] = bars.add_task(text, total=total)
-                bars.update(tasks[text], completed=done, total=total)
+                if text not in stages:
+                    stages[text] = (_Stage(text), bars.add_task(text, total=total))
+                stage, task = stages[text]
+                bars.update(task, completed=done, total=total, description=stage.tell(done, total))
 
             yield report
     else:
@@ -150,17 +172,33 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
 
 
 class _LineReport:
-    """Progress for logs: a line when a stage begins, every ten seconds within it, and when it ends."""
+    """Progress for logs: a line when a stage begins, every thirty seconds within it, and when it ends; nothing moves."""
+
+    EVERY = 30.0  # s
 
     def __init__(self) -> None:
         self.text, self.began, self.last = "", 0.0, 0.0
+        self.stage = _Stage("")
 
     def __call__(self, done: float, total: float, text: str) -> None:
         now = time.monotonic()
         if text != self.text:
             self.text, self.began, self.last = text, now, -math.inf
-        if now - self.last < 10.0 and done < total:
+            self.stage = _Stage(text)
+        said = self.stage.tell(done, total)
+        ends = done >= total and not self.stage.done
+        if self.stage.done or (now - self.last < self.EVERY and not ends):
             return
-        self.last = now
-        left = f", about {(now - self.began) * (total - done) / done:.0f} s left" if 0 < done < total else ""
-        typer.echo(f"{text}: {done / total:.0%}{left}", err=True)
+        self.last, self.stage.done = now, ends
+        left = (
+            f", about {say_time((now - self.began) * (total - done) / done)} left" if 0 < done < total else ""
+        )
+        share = f": {done / total:.0%}" if total > 0 else ""
+        typer.echo(f"{said}{share}{left}", err=True)
+
+
+def say_time(seconds: float) -> str:
+    """45 s, 12 min, 3.5 h."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -164,7 +164,9 @@ row_sigma_px = {NOISE}
 
 
 def write_scan(folder: Path) -> None:
-    phantom = Phantom()
+    depth, _ = move(0.5e-3, 1.33e-6, 0.8, 1300.0)
+    plain = Phantom()
+    phantom = Phantom(centre=(54.3, 50.6, depth / plain.voxel - plain.radius + plain.surface))
     scan = phantom.write(folder / "slices")
     grey = phantom.calibration
     (folder / "scan.toml").write_text(
