@@ -45,8 +45,8 @@ contact_friction = 0.0              # Coulomb coefficient between tip and dust; 
 # geometry = "axisymmetric"         # or "planar": a cylinder in the plane instead of a round tip
 
 # [source]                          # optional: where the figures come from, one text a key; "assumed" is counted by labsim check
-# published = ""
-# assumed = ""
+# published = "thesis, table 4"      # what was read where
+# assumed = "length of the rods"     # what nobody measured
 """
 
 DROP = """# One drop; the name of this folder is its name. Copy the folder for the next one and count sequence up.

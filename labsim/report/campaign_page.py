@@ -37,7 +37,7 @@ PICTURES = {
     "maps": "Every scan: filling factor measured, simulated, and measured minus simulated.",
     "held_out": "Held-out drops: what each model misses of a drop that no fit has seen.",
     "posterior": "Posterior density of p_m.",
-    "corner": "Posterior of the extended model, every parameter against every other.",
+    "corner": "Posterior, every parameter against every other.",
     "undisturbed": "Filling factor of undisturbed dust against depth.",
 }
 
@@ -65,7 +65,7 @@ def write_campaign_page(
             "it does not explain the data" if found.p_value < 0.05 else "it explains the data",
         ),
         (
-            "best cause",
+            "most probable",
             f"{found.verdict.probabilities[0][1]:.2f}",
             " + ".join(found.verdict.probabilities[0][0]),
         ),

@@ -290,7 +290,7 @@ def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dic
         fraction = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f}")
         words += (
             f", {labels[1]} by {extended} µm, and a true model would by {noise} µm; {fraction} % of the removable discrepancy is "
-            f"gone. The ln score is {show_number(gain['log_score_difference'], '{:+.1f}')}{about} better."
+            f"gone. The ln score of the held-out drops changes by {show_number(gain['log_score_difference'], '{:+.1f}')}{about}."
         )
     else:
         words += (

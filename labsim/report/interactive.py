@@ -179,11 +179,11 @@ def plot_map(view: MapView, values: FloatArray, *, difference: bool = False) -> 
     heat = {
         "type": "heatmap", "x": r, "y": found.z * 1e3, "z": values, "zmin": limits["vmin"],
         "zmax": limits["vmax"], "colorscale": "RdBu" if difference else "Viridis",
-        "colorbar": {"thickness": 12, "tickformat": "+.2f" if difference else ".2f", "len": 0.9},
+        "colorbar": {"thickness": 10, "tickformat": "+.2f" if difference else ".2f", "len": 0.9},
         "hovertemplate": "r %{x:.3f} mm, z %{y:.3f} mm: %{z:.4f}<extra></extra>",
     }  # fmt: skip
     layout = {
-        "height": 390,
+        "height": 300,
         "margin": MARGIN | {"r": 4, "t": 10},
         "xaxis": {
             "title": {"text": "r (mm)"}, "constrain": "domain", "constraintoward": "right", "showgrid": False,
