@@ -78,7 +78,7 @@ def judge_campaign(
     scheduler: str | None = None,
     seed: int = 1,
     progress: Progress | None = None,
-    use_scans: bool = False,
+    use_scans: bool = True,
     cells: int | None = None,
     measurements: Measurements | None = None,
 ) -> Judgement:
@@ -124,7 +124,7 @@ def diagnose_campaign(
     scheduler: str | None = None,
     seed: int = 1,
     progress: Progress | None = None,
-    use_scans: bool = False,
+    use_scans: bool = True,
     cells: int | None = None,
     measurements: Measurements | None = None,
 ) -> Diagnosis:
@@ -217,7 +217,7 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
             bench,
             pair,
             (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair}),
-            models=start.models,
+            nuisances=start,
         )
         for pair, start in starts.items()
     ]

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..inference.fitting import Fit, Workbench, amplitude_nodes, with_probes
-from ..inference.grid import STRENGTH_ANCHOR, STRENGTH_RATIO
+from ..inference.fitting import Fit, Workbench, amplitude_nodes, screening_node, with_probes
 from ..records import FloatArray
 
 DRAWS = 20_000
@@ -109,12 +108,6 @@ def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str
             )
             found.append(((first, screening.names[j]), float(log_bayes)))
     return sorted(found, key=lambda item: -item[1])
-
-
-def screening_node(log_p_m: float) -> int:
-    """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
-    whose nominal p_m an effect has driven off still share their fingerprints' runs."""
-    return 2 * round(0.5 * (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
 
 
 def _has_runs(bench: Workbench, name: str) -> bool:

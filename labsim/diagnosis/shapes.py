@@ -138,7 +138,7 @@ def merge_variants(
 
 def _take_name(bench: Workbench, variant: str, base: str) -> None:
     bench.effects[base] = bench.effects[variant]
-    for table in [*bench.tables, *(t for scan in bench.scans for t in (scan.table, scan.blurred))]:
+    for table in [*bench.tables, *(scan.table for scan in bench.scans)]:
         for kept in (table.changes, table.fingerprints):
             kept.pop(base, None)
             if variant in kept:

@@ -49,7 +49,7 @@ def prepare(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
-    use_scans: bool = False,
+    use_scans: bool = True,
     cells: int | None = None,
     measurements: Measurements | None = None,
     model: Model | None = None,
@@ -87,7 +87,7 @@ def calibrate(
     seed: int = 1,
     progress: Progress | None = None,
     backend: Path | None = None,
-    use_scans: bool = False,
+    use_scans: bool = True,
 ) -> Calibration:
     """Posterior of p_m (Pa) and of effects named in ``parameters`` ("shear_strength" or "shear_strength.factor").
 
@@ -193,7 +193,7 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
 
     def residual(theta: FloatArray) -> FloatArray:
         values = dict(zip(fit.hypothesis, theta[1:], strict=True))
-        linear = linearise_at(bench, fit.models, float(theta[0]), values)
+        linear = linearise_at(bench, fit.models, fit.scan_speeds, float(theta[0]), values)
         return np.concatenate(
             [
                 solve_triangular(lower, block.residual, lower=True)

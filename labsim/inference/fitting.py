@@ -46,7 +46,7 @@ from .likelihood import (
 )
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
-from .scans import BLUR_PROBE, ObservedScan, ScanModel, encode_scan_run, linearise_scan, update_speed
+from .scans import ObservedScan, ScanModel, encode_scan_run, linearise_scan, update_speed
 from .undisturbed import Seen, UndisturbedDust, linearise_undisturbed
 
 Hypothesis = tuple[str, ...]
@@ -73,6 +73,7 @@ class Fit:
     evidence: float
     linear: Linearised
     models: list[DropModel]
+    scan_speeds: tuple[float, ...] = ()  # ln of the impact speeds of the scans, at their best
 
 
 @dataclass
@@ -108,9 +109,8 @@ class Workbench:
             tables = [(self.tables[number], encode_run)]
         else:
             tables = [
-                (table, partial(encode_scan_run, observed=scan.observed, blur=blur))
+                (scan.table, partial(encode_scan_run, observed=scan.observed))
                 for scan in self.scans
-                for table, blur in ((scan.table, 0.0), (scan.blurred, BLUR_PROBE))
                 if self._scan_family(scan) == number
             ]
         return [
@@ -274,9 +274,7 @@ def open_workbench(
         few = few_positions(nodes, slowest, fastest)
         families.append(Family(Projectile(tip, radius, mass), nodes, True, few))
         for scan in group:
-            start = math.log(scan.scan.speed.value)
-            tables_of_scan = [ResponseTable(np.log(nodes), few) for _ in range(2)]
-            scan_models.append(ScanModel(scan, *tables_of_scan, start))
+            scan_models.append(ScanModel(scan, ResponseTable(np.log(nodes), few)))
     resolved, reasons = {}, {}
     for name, effect in effects.items():
         reason = effect.applies(campaign)
@@ -356,25 +354,34 @@ def nearest_nodes(log_p_m: float, share: float = 0.3) -> list[int]:
     return [math.floor(place), math.ceil(place)]
 
 
+def screening_node(log_p_m: float) -> int:
+    """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
+    whose nominal p_m an effect has driven off still share their fingerprints' runs."""
+    return 2 * round(0.5 * (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
+
+
 def fit_hypothesis(
     bench: Workbench,
     hypothesis: Hypothesis,
     start: tuple[float, Mapping[str, float]],
     *,
-    refine: bool = True,
-    models: list[DropModel] | None = None,
+    coarse: bool = False,
+    nuisances: Fit | None = None,
 ) -> Fit:
-    """Gauss-Newton from ``start`` = (ln p_m, amplitudes). With refine, runs are made about each new estimate."""
-    models = copy.deepcopy(models if models is not None else bench.models)
+    """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
+
+    coarse : what effects change is taken from fingerprints. nuisances : a fit whose nuisances are the starting values.
+    """
+    models = copy.deepcopy(nuisances.models if nuisances is not None else bench.models)
+    speeds = list(nuisances.scan_speeds if nuisances is not None else (scan.stated for scan in bench.scans))
     for model in models:  # tables are shared, only nuisances are the fit's own
         model.table = bench.tables[_table_number(bench, model)]
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
     names = ("ln_p_m", *hypothesis)
     for iteration in range(ITERATIONS):
-        if refine:
-            _ask(bench, hypothesis, log_p_m, values)
-        linear = linearise_at(bench, models, log_p_m, values)
+        _ask(bench, hypothesis, log_p_m, values, coarse=coarse)
+        linear = linearise_at(bench, models, speeds, log_p_m, values)
         step, covariance, _chi, _logdet, weighted = solve_globals(
             linear.blocks, names, _priors(bench, values)
         )
@@ -387,13 +394,13 @@ def fit_hypothesis(
             values[name] = _inside(bench, name, before + float(moved[k + 1]))
             change.append(abs(values[name] - before) / math.sqrt(covariance[k + 1, k + 1]))
         shift = update_nuisances(models, linear, weighted[0])
-        for scan, block, weights in zip(bench.scans, linear.scans, weighted[1:], strict=False):
-            shift = max(shift, 0.5 * update_speed(scan, block, weights))
+        for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
+            speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
+            shift = max(shift, 0.5 * moved_by)
         if max(change) < SETTLED and shift < 0.05 and iteration > 0:
             break
-    if refine:
-        _ask(bench, hypothesis, log_p_m, values)
-    linear = linearise_at(bench, models, log_p_m, values)
+    _ask(bench, hypothesis, log_p_m, values, coarse=coarse)
+    linear = linearise_at(bench, models, speeds, log_p_m, values)
     step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
     solved_here = _chi_here(linear)
     n = sum(block.residual.size for block in linear.blocks)
@@ -419,6 +426,7 @@ def fit_hypothesis(
         float(evidence),
         linear,
         models,
+        tuple(speeds),
     )
 
 
@@ -435,12 +443,13 @@ def _table_number(bench: Workbench, model: DropModel) -> int:
 
 def with_probes(bench: Workbench, fit: Fit, names: Sequence[str]) -> Linearised:
     """The linearisation of a fit with tangents of further effects at their null."""
-    return linearise_at(bench, fit.models, fit.log_p_m, fit.values, names)
+    return linearise_at(bench, fit.models, fit.scan_speeds, fit.log_p_m, fit.values, names)
 
 
 def linearise_at(
     bench: Workbench,
     models: list[DropModel],
+    scan_speeds: Sequence[float],
     log_p_m: float,
     values: Mapping[str, float],
     further: Sequence[str] = (),
@@ -457,10 +466,12 @@ def linearise_at(
     instruments, offsets = bench.instruments(values), bench.log_offsets(values)
     linear = linearise(models, log_p_m, values, instruments, offsets, bench.terms, probes)
     blocks = []
-    for scan in bench.scans:
+    for scan, speed in zip(bench.scans, scan_speeds, strict=True):
         name = scan.observed.name
         seen = {probe: (amps, insts[name], step) for probe, (amps, insts, _offsets, step) in probes.items()}
-        blocks.append(linearise_scan(scan, log_p_m, values, instruments[name], bench.terms.scatter, seen))
+        blocks.append(
+            linearise_scan(scan, speed, log_p_m, values, instruments[name], bench.terms.scatter, seen)
+        )
     return replace(linear, scans=tuple(blocks), undisturbed=tuple(_linearise_dust(bench, values, probes)))
 
 
@@ -505,15 +516,17 @@ def _chi_here(linear: Linearised) -> float:
     return total
 
 
-def amplitude_nodes(bench: Workbench, name: str, amplitude: float) -> list[float]:
+def amplitude_nodes(bench: Workbench, name: str, amplitude: float, *, coarse: bool = False) -> list[float]:
     """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits."""
     parameter = bench.effects[name].amplitudes[0]
     step, (low, high) = parameter.step, parameter.limits
     place = amplitude / step
-    if abs(place) <= 1.0 or bench.effects[name].kind == "numerics":  # much finer runs would cost more than they say
+    if (
+        abs(place) <= 1.0 or bench.effects[name].kind == "numerics"
+    ):  # much finer runs would cost more than they say
         wanted = [1.0 if place >= 0 else -1.0]
     else:
-        ladder = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
+        ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
         sign = math.copysign(1.0, place)
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
         below = [m for m in ladder if m < abs(place)] or [1.0]
@@ -528,17 +541,19 @@ def amplitude_nodes(bench: Workbench, name: str, amplitude: float) -> list[float
     return nodes
 
 
-def _ask(bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mapping[str, float]) -> None:
+def _ask(
+    bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mapping[str, float], *, coarse: bool
+) -> None:
     bench.require_base(enclosing_nodes(log_p_m))
     wanted = [
         (name, amplitude, index)
         for name in hypothesis
         if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench, name, values[name])
-        for index in nearest_nodes(log_p_m)
+        for amplitude in amplitude_nodes(bench, name, values[name], coarse=coarse)
+        for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m))
     ]
     if wanted:
-        bench.require_changes(wanted, " and ".join(hypothesis))
+        bench.require_changes(wanted, " and ".join(hypothesis), coarse=coarse)
 
 
 def _priors(bench: Workbench, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:

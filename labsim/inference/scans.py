@@ -1,9 +1,10 @@
-"""A CT map in the likelihood: simulated dust seen through the scan, in the frame of the undisturbed surface.
+"""The compacted zone of a CT map in the likelihood: simulated dust seen through the scan, in the frame of the tip.
 
-Codes of scan runs are (ln D, filling factor on the scan's cells). The dust stays where the stop left it; the bead does not: it
-rebounds by some tens of micrometres before it comes to rest, so where it lies is compared with a generous error (LIFT).
-Nuisances: impact speed (stated, moved to its best value), grey level (GREY), height of the map (SHIFT), sample scatter. Noise:
-the map's own, correlated between neighbouring cells as measured in undisturbed dust, and the solver's error of the compaction.
+Codes of scan runs are (ln D, filling factor on the scan's cells), the simulated dust moved so that its deepest tip lies where the
+scan's bead ends: the zone under the tip changes slowly with speed and p_m, the depth that it lies at does not. The bead rebounds
+by some tens of micrometres after the dust has stopped moving, so both are compared up to a common LIFT. Further nuisances:
+impact speed (stated, moved to its best value), grey level (GREY), sample scatter. Noise: the map's own, correlated between
+neighbouring cells as measured in undisturbed dust, and the solver's error of the compaction.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from .blocks import Block
 from .forward import ResponseTable
 
 GREY = 0.005  # relative, of the grey calibration, where nothing is stated
-SHIFT = 10e-6  # m, of the map against its surface
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
-NUMERICAL_SHARE = 0.06  # of φ - φ0: two spacings differ by that beside the tip
-NUMERICAL_FLOOR = 0.0015
+NUMERICAL_DEPTH = 0.01  # of the depth
+NUMERICAL_SHARE = 0.04  # of φ - φ0: two spacings differ by that beside the tip
+NUMERICAL_FLOOR = 0.001
 CORRELATION = 0.25  # length of the solver's error, tip radii
 
 
@@ -51,14 +52,12 @@ class ObservedScan:
 
 
 def observe_scan(reduced: ReducedScan) -> ObservedScan:
-    """Choose the cells: within three tip radii of the axis, from two below the tip to just under the surface."""
+    """Choose the cells: within three tip radii of the axis, from two below the tip to a third above it."""
     found, radius = reduced.map, reduced.scan.projectile.tip_radius
     r, z = np.meshgrid(found.r, found.z)
     finite = np.isfinite(found.filling_factor) & np.isfinite(found.sigma) & ~reduced.masked
-    inside = (r < 3 * radius) & (z < -0.25 * radius) & (z > -found.tip_depth - 2 * radius)
-    # the hole above the bead is air and its wall is not modelled well
-    above = (r < 1.4 * radius) & (z > -found.tip_depth + 1.2 * radius)
-    cells = finite & inside & ~above
+    inside = (r < 3 * radius) & (z < -0.25 * radius)
+    cells = finite & inside & (np.abs(z + found.tip_depth + 0.85 * radius) < 1.15 * radius)
     return ObservedScan(
         reduced.scan,
         reduced,
@@ -69,8 +68,8 @@ def observe_scan(reduced: ReducedScan) -> ObservedScan:
     )
 
 
-def encode_scan_run(run: DropRun, observed: ObservedScan, blur: float = 0.0) -> FloatArray:
-    """(1 + n,): ln D and the filling factor on the compared cells. blur: m, beside the scan's own, in quadrature."""
+def encode_scan_run(run: DropRun, observed: ObservedScan) -> FloatArray:
+    """(1 + n,): ln D and the filling factor on the compared cells, through the point spread that the scan itself shows."""
     dust, reduced = run.particles, observed.reduced
     seen = project(
         dust.r,
@@ -78,7 +77,8 @@ def encode_scan_run(run: DropRun, observed: ObservedScan, blur: float = 0.0) -> 
         dust.volume,
         dust.filling_factor,
         reduced.map,
-        blur=math.hypot(reduced.blur, blur),
+        blur=reduced.blur if math.isfinite(reduced.blur) else reduced.scan.voxel,
+        shift=run.penetration_depth - reduced.map.tip_depth,
         masked=~observed.cells,
     )
     return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
@@ -88,15 +88,16 @@ def encode_scan_run(run: DropRun, observed: ObservedScan, blur: float = 0.0) -> 
 class ScanModel:
     observed: ObservedScan
     table: ResponseTable
-    blurred: ResponseTable  # the same runs with BLUR_PROBE more blur, for the tangent of the blur
-    log_speed: float  # ln of the impact speed, moved to its best value by each fit
 
-
-BLUR_PROBE = 3.0e-5  # m
+    @property
+    def stated(self) -> float:
+        """ln of the stated impact speed; every fit moves its own copy to its best value."""
+        return math.log(self.observed.scan.speed.value)
 
 
 def linearise_scan(
     model: ScanModel,
+    log_speed: float,
     log_p_m: float,
     amplitudes: Mapping[str, float],
     instrument: Instrument,
@@ -105,16 +106,11 @@ def linearise_scan(
 ) -> Block:
     """Residual, covariance and tangents of one scan; probes: name -> (amplitudes, instrument, step)."""
     observed = model.observed
-    log_speed = model.log_speed
     found = observed.reduced.map
 
     def predict(lp: float, ls: float, amps: Mapping[str, float], inst: Instrument) -> FloatArray:
         code = model.table.code(lp, ls, amps)
-        cells = code[1:]
-        if inst.ct_blur > 0:
-            wide = model.blurred.code(lp, ls, amps)[1:]
-            cells = cells + (wide - cells) * (inst.ct_blur / BLUR_PROBE) ** 2  # blur adds variances
-        return np.concatenate([cells * inst.ct_scale, [math.exp(code[0])]])
+        return np.concatenate([code[1:] * inst.ct_scale, [math.exp(code[0])]])
 
     here = predict(log_p_m, log_speed, amplitudes, instrument)
     data = np.concatenate([observed.filling_factor, [found.tip_depth]])
@@ -132,7 +128,7 @@ def linearise_scan(
     contrast = np.abs(here[:n] - observed.undisturbed)
     error = NUMERICAL_SHARE * contrast + NUMERICAL_FLOOR
     covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2)
-    covariance[n, n] = LIFT**2
+    covariance[n, n] = (NUMERICAL_DEPTH * math.exp(model.table.code(log_p_m, log_speed, amplitudes)[0])) ** 2
     speed = observed.scan.speed
     nuisances = [
         (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here)
@@ -140,7 +136,7 @@ def linearise_scan(
         * (speed.sigma / speed.value),
         (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02 * scatter,
         np.append(here[:n] * GREY, 0.0),
-        np.append(_slope_along_z(observed, here[:n]) * SHIFT, 0.0),
+        np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
     spread = speed.sigma / speed.value
     pull = (log_speed - math.log(speed.value)) / spread
@@ -164,12 +160,12 @@ def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:
     return np.nan_to_num(slope[observed.cells])
 
 
-def update_speed(model: ScanModel, block: Block, weighted: FloatArray) -> float:
-    """Move the impact speed of a scan to its conditional best value; return the move in stated uncertainties."""
+def update_speed(
+    model: ScanModel, log_speed: float, block: Block, weighted: FloatArray
+) -> tuple[float, float]:
+    """Conditional best ln of the impact speed, and the move there in stated uncertainties."""
     speed = model.observed.scan.speed
     assert block.by_speed is not None
     best = float(np.clip(block.by_speed @ weighted, -3.0, 3.0))
-    moved = math.log(speed.value) + best * speed.sigma / speed.value
-    change = abs(moved - model.log_speed) * speed.value / speed.sigma
-    model.log_speed = moved
-    return change
+    moved = model.stated + best * speed.sigma / speed.value
+    return moved, abs(moved - log_speed) * speed.value / speed.sigma
