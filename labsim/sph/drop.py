@@ -78,7 +78,7 @@ def advance(
             if axisymmetric:
                 ring[i] = x[i]
             area[i] = s[MASS, i] / (density[i] * ring[i])
-        worst = bound_step(np.uint64(0), np.uint64(n), axisymmetric, h, ring, sound, worst)
+        worst = bound_step(np.uint64(0), np.uint64(n), axisymmetric, h, ring, sound, s[GXX], s[GZZ], worst)
         dt = courant * h / math.sqrt(worst)
         if not (dt > 0.0):
             return -1 - step

@@ -14,6 +14,7 @@ from ._jit import compiled
 SMALLEST_EIGENVALUE = 0.3  # of the moment matrix, below which it is lifted: a lone particle has no gradient
 
 HOOP_STIFFNESS = 0.6  # a in bound_step
+FEW = 1.4  # half trace of B from which on a particle has so few neighbours that the step is shortened
 
 
 @compiled
@@ -59,13 +60,17 @@ def carry_stress(
 
 
 @compiled
-def bound_step(low, high, axisymmetric, h, ring, sound, worst):
-    """The larger of ``worst`` and of c² (1 + (a h/r)²), m²/s², over particles low..high-1: near the axis the hoop strain v/r is
-    stiffer than any gradient and asks for a shorter step."""
+def bound_step(low, high, axisymmetric, h, ring, sound, bxx, bzz, worst):
+    """The larger of ``worst`` and of c² (1 + (a h/r)²) max(1, tr B / 2.8)², m²/s², over particles low..high-1.
+
+    Near the axis the hoop strain v/r is stiffer than any gradient, and so is the gradient of a particle with few neighbours: both
+    ask for a shorter step.
+    """
     reach = HOOP_STIFFNESS * h if axisymmetric else 0.0
     for i in range(low, high):
         ratio = reach / ring[i]
-        worst = max(worst, sound[i] * sound[i] * (1.0 + ratio * ratio))
+        few = max((bxx[i] + bzz[i]) * (0.5 / FEW), 1.0)
+        worst = max(worst, (sound[i] * few) ** 2 * (1.0 + ratio * ratio))
     return worst
 
 
