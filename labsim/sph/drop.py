@@ -18,7 +18,7 @@ from ..records import FloatArray, Projectile
 from . import particles as rows
 from ._jit import compiled_entry
 from .gradients import bound_step, carry_stress, deform, mirror_axis, renormalise
-from .lines import WIDTH, make_lines, write_lines, ROOM
+from .lines import ROOM, WIDTH, make_lines, write_lines
 from .materials.porous_dust import elastic_energy, tabulate_strengths, update_stress
 from .neighbours import Neighbours
 from .pairs import sum_forces, sum_gradients
@@ -55,9 +55,9 @@ BLOCK = np.uint64(
 
 @compiled_entry
 def advance(
-    s, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin, allowed, steps, log, first,
-    body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, wall_weight, contact_stiffness, friction,
-    side_friction, depth_knots, depth_force, speed_knots, speed_force,
+    s, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
+    allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap,
+    wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
     law, extras, strength, tension,
 ):  # fmt: skip
     """Up to ``steps`` steps, or until a point has moved ``allowed`` from ``origin``. Returns how many were made.
@@ -102,7 +102,8 @@ def advance(
             renormalise(low, high, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ])
             update_stress(
                 low, high, last_dt, axisymmetric, plain, law, strength, tension, ring, u, s[LXX], s[LXZ], s[LZX], s[LZZ],
-                density, s[ZERO_STRESS], s[INITIAL], s[SXX], s[SZZ], s[SXZ], s[PRESSURE], sound, s[WORK], s[COMPRESSIVE], s[TENSILE],
+                density, s[ZERO_STRESS], s[INITIAL], s[SXX], s[SZZ], s[SXZ], s[PRESSURE], sound, s[WORK], s[COMPRESSIVE],
+                s[TENSILE],
             )  # fmt: skip
             deform(low, high, last_dt, s[LXX], s[LXZ], s[LZX], s[LZZ], s[DXX], s[DXZ], s[DZX], s[DZZ])
             carry_stress(
@@ -140,7 +141,8 @@ def advance(
             write_lines(back, k, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ], s[MXX], s[MXZ], s[MZX])
         sum_forces(
             np.uint64(0), np.uint64(n), x, z, u, w, area, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ],
-            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, alpha, beta, affine, s[FX], s[FZ], s[HEAT],
+            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, alpha, beta, affine,
+            s[FX], s[FZ], s[HEAT],
         )  # fmt: skip
         if axisymmetric:
             for i in range(n):
@@ -259,7 +261,9 @@ def evolve(
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
         if n + source.size + WIDTH > state.shape[1]:
             front, back = (make_lines(n + source.size + 64 + WIDTH) for _ in range(2))
-            state = np.concatenate([state[:, :n], np.zeros((state.shape[0], source.size + 64 + WIDTH))], axis=1)
+            state = np.concatenate(
+                [state[:, :n], np.zeros((state.shape[0], source.size + 64 + WIDTH))], axis=1
+            )
         state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
         state[rows.Z, n : n + source.size] = state[rows.Z, source]
         neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
@@ -273,10 +277,12 @@ def evolve(
             left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, neighbours.start, neighbours.list, origin, 0.45 * skin, steps,
-                log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
+                state, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
+                neighbours.start, neighbours.list, origin, 0.45 * skin, steps, log, made + 1, body,
+                projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
-                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
+                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness,
+                material.contact_friction, setting.side_friction * force_scale,
                 *depth_law, *speed_law, law, extras, strength, tension,
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():

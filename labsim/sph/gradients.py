@@ -14,7 +14,7 @@ from ._jit import compiled
 SMALLEST_EIGENVALUE = 0.3  # of the moment matrix, below which it is lifted: a lone particle has no gradient
 
 HOOP_STIFFNESS = 0.6  # a in bound_step
-FEW = 1.4  # half trace of B from which on a particle has so few neighbours that the step is shortened
+FEW = 1.8  # half trace of B from which on a particle has so few neighbours that the step is shortened
 
 
 @compiled
@@ -61,7 +61,7 @@ def carry_stress(
 
 @compiled
 def bound_step(low, high, axisymmetric, h, ring, sound, bxx, bzz, worst):
-    """The larger of ``worst`` and of c² (1 + (a h/r)²) max(1, tr B / 2.8)², m²/s², over particles low..high-1.
+    """The larger of ``worst`` and of c² (1 + (a h/r)²) max(1, tr B / (2 FEW))², m²/s², over particles low..high-1.
 
     Near the axis the hoop strain v/r is stiffer than any gradient, and so is the gradient of a particle with few neighbours: both
     ask for a shorter step.

@@ -69,9 +69,7 @@ def _make_reader(wanted: int):
                 place = builder.add(args[2], ir.Constant(_INDEX, lane))
                 index = builder.load(builder.gep(near, [place]))
                 start = builder.shl(builder.zext(index, _INDEX), ir.Constant(_INDEX, 3))
-                rows.append(
-                    builder.load(_vector_at(builder, source, start), align=64)
-                )
+                rows.append(builder.load(_vector_at(builder, source, start), align=64))
             for field, column in enumerate(_transpose(builder, rows)[:wanted]):
                 place = builder.add(args[4], ir.Constant(_INDEX, field * ROOM))
                 builder.store(column, _vector_at(builder, target, place), align=8)
@@ -97,9 +95,7 @@ def write_lines(typing, lines, first, a, b, c, d, e, f, g, h):
         rows = []
         for kind, value in zip(signature.args[2:], args[2:], strict=True):
             row = _data(context, builder, kind, value)
-            rows.append(
-                builder.load(_vector_at(builder, row, args[1]), align=8)
-            )
+            rows.append(builder.load(_vector_at(builder, row, args[1]), align=8))
         start = builder.shl(args[1], ir.Constant(_INDEX, 3))
         for lane, column in enumerate(_transpose(builder, rows)):
             place = builder.add(start, ir.Constant(_INDEX, lane * WIDTH))

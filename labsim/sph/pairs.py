@@ -104,7 +104,8 @@ def sum_forces(
                 dw = wi - near[3, k]
                 jump = du * dx + dw * dz
                 jump -= half * (
-                    ((ixx + beyond[2, k]) * dx + (ixz + beyond[3, k]) * dz) * dx + (izz + beyond[4, k]) * dz * dz
+                    ((ixx + beyond[2, k]) * dx + (ixz + beyond[3, k]) * dz) * dx
+                    + (izz + beyond[4, k]) * dz * dz
                 )
                 mu = jump / (d2 + floor)
                 q = (wti + beyond[0, k]) * (linear * (ci + beyond[1, k]) + square * abs(mu)) * mu

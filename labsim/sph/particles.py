@@ -10,7 +10,8 @@ from .setting import DropSetting
 
 ROWS = (
     "x z u w mass area ring weight sound density zero_stress initial sxx szz sxz pressure work elastic heat "
-    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz shear distance nx nz thickness rest_density compressive tensile"
+    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz shear distance nx nz "
+    "thickness rest_density compressive tensile"
 ).split()
 (
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,

@@ -29,7 +29,11 @@ def oscillate_plate(thickness_in_particles):
     m, n = math.cos(1.875) + math.cosh(1.875), math.sin(1.875) + math.sinh(1.875)
     shape = m * (np.cosh(s) - np.cos(s)) - n * (np.sinh(s) - np.sin(s))
     state[rows.W] = (
-        0.002 * math.sqrt(bulk / 1000) * shape / np.abs(shape).max() * np.sign(shape[np.argmax(state[rows.X])])
+        0.002
+        * math.sqrt(bulk / 1000)
+        * shape
+        / np.abs(shape).max()
+        * np.sign(shape[np.argmax(state[rows.X])])
     )
     tip = state[rows.X] > length - 1.1 * spacing
     rest = state[rows.Z, tip].mean()
@@ -122,7 +126,9 @@ def test_stress_turns_with_the_body():
 
     material = elastic_material(45e3, 0.5)
     strength, tension = dust.tabulate_strengths(material)
-    row = {name: np.zeros(1) for name in "sxz pressure sound work compressive tensile zero lxx lzz vr".split()}
+    row = {
+        name: np.zeros(1) for name in "sxz pressure sound work compressive tensile zero lxx lzz vr".split()
+    }
     sxx, szz, rho, one = np.array([100.0]), np.array([-40.0]), np.array([300.0]), np.ones(1)
     steps = 20000
     for _ in range(steps):

@@ -81,10 +81,11 @@ def test_strength_goes_on_without_a_jump_beyond_its_poles():
 )
 def test_zero_stress_filling_factor(p_m, modulus, phi, expected):
     pressure = float(dust.compressive_strength(phi, Material(p_m=p_m)))
-    zero = dust.solve_zero_stress(phi, pressure, modulus, 4.0)
-    assert zero == pytest.approx(expected, abs=1.01e-5)
-    stiffness = modulus * (zero / 0.15) ** 4
-    assert stiffness * (phi / zero - 1) == pytest.approx(pressure, rel=1e-9)
+    for fourth in (True, False):  # the power by products, and by the general function
+        zero = dust.solve_zero_stress(phi, pressure, modulus, 4.0, fourth)
+        assert zero == pytest.approx(expected, abs=1.01e-5)
+        stiffness = modulus * (zero / 0.15) ** 4
+        assert stiffness * (phi / zero - 1) == pytest.approx(pressure, rel=1e-9)
 
 
 class OneParticle:
@@ -93,7 +94,9 @@ class OneParticle:
     def __init__(self, material, phi=0.15, plain=True):
         self.material, self.plain = material, plain
         self.strength, self.tension = dust.tabulate_strengths(material)
-        self.row = {name: np.zeros(1) for name in "sxx szz sxz pressure sound work compressive tensile".split()}
+        self.row = {
+            name: np.zeros(1) for name in "sxx szz sxz pressure sound work compressive tensile".split()
+        }
         self.rho, self.zero, self.initial = np.array([2000.0 * phi]), np.array([phi]), np.array([phi])
 
     def move(self, phi, steps, shear=0.0):
