@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import llvmlite.binding
 import numba
 import platformdirs
 
@@ -30,6 +31,10 @@ SOLVER_HASH = hash_sources()
 
 if "NUMBA_CACHE_DIR" not in os.environ:
     numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("labsim")) / "compiled" / SOLVER_HASH)
+
+# A loop over particles reads and writes two dozen rows, and each pair of them needs a test that they do not overlap before the
+# loop may be vectorised; by default the compiler gives up at eight tests. Rows never overlap, a test costs a nanosecond.
+llvmlite.binding.set_option("labsim", "-runtime-memory-check-threshold=2000")
 
 # not fastmath=True: "nnan" and "ninf" make NaN checks inside kernels return False in silence
 FAST = {"reassoc", "contract", "arcp", "nsz"}

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SimulationError
-from ..records import FloatArray
+from ..records import FloatArray, Projectile
 from . import particles as rows
 from ._jit import compiled_entry
-from .gradients import carry_stress, deform, mirror_axis, renormalise
-from .materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths, update_stress
+from .gradients import bound_step, carry_stress, deform, mirror_axis, renormalise
+from .lines import ROOM, WIDTH, make_lines, write_lines
+from .materials.porous_dust import elastic_energy, tabulate_strengths, update_stress
 from .neighbours import Neighbours
 from .pairs import sum_forces, sum_gradients
 from .particles import place_particles
@@ -39,37 +40,46 @@ LOG = (
     "outside",
 )
 STEPS_AT_ONCE = 64
+EIGHT = np.uint64(WIDTH)
+BLOCK = np.uint64(
+    128
+)  # particles between two sums over neighbours at a time; unsigned, or no loop is vectorised
 
 # rows of particles.ROWS, as constants a compiled function can see
 (
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
-    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, GZX,
-    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY,
+    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, SHEAR,
+    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY, COMPRESSIVE, TENSILE,
 ) = range(len(rows.ROWS))  # fmt: skip
 
 
 @compiled_entry
 def advance(
-    s, n, axisymmetric, source, twice_plane, wall, start, neighbour, origin, allowed, steps, log, first,
-    body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap, wall_weight, contact_stiffness, friction,
-    side_friction, depth_knots, depth_force, speed_knots, speed_force,
-    solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor, rate_eta, rate_n, pore_gas,
+    s, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
+    allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap,
+    wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
+    law, extras, strength, tension,
 ):  # fmt: skip
     """Up to ``steps`` steps, or until a point has moved ``allowed`` from ``origin``. Returns how many were made.
 
     body: tip height, speed, time, accumulated friction heat. Rows of ``s`` hold n particles and their mirror images.
     """
-    x, z, u, w, area, ring = s[X], s[Z], s[U], s[W], s[AREA], s[RING]
+    x, z, u, w, area, ring, density, sound = s[X], s[Z], s[U], s[W], s[AREA], s[RING], s[DENSITY], s[SOUND]
     images = source.size
+    one = np.uint64(1)
+    blocks = (np.uint64(n) + BLOCK - one) // BLOCK
+    plain = len(extras) == 0  # known to the compiler
+    stop = start[1:]
     contact = np.zeros(2)
+    nearby, beyond = np.zeros((8, ROOM)), np.zeros((8, ROOM))
     for step in range(steps):
-        fastest = 0.0
+        worst = 0.0
         for i in range(n):
             if axisymmetric:
                 ring[i] = x[i]
-            area[i] = s[MASS, i] / (s[DENSITY, i] * ring[i])
-            fastest = max(fastest, s[SOUND, i])
-        dt = courant * h / fastest
+            area[i] = s[MASS, i] / (density[i] * ring[i])
+        worst = bound_step(np.uint64(0), np.uint64(n), axisymmetric, h, ring, sound, s[GXX], s[GZZ], worst)
+        dt = courant * h / math.sqrt(worst)
         if not (dt > 0.0):
             return -1 - step
         for k in range(images):
@@ -78,36 +88,44 @@ def advance(
         mirror_axis(n, images, source, u, -1.0)
         mirror_axis(n, images, source, w, 1.0)
         mirror_axis(n, images, source, area, 1.0)
-        sum_gradients(
-            n, x, z, u, w, area, start, neighbour, h, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ]
-        )
-        renormalise(n, s[GXX], s[GXZ], s[GZX], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ])
-        # the velocities are those of the step that has just moved the particles, so is its length
-        update_stress(
-            n, body[4], axisymmetric, solid_density, strength, tension, inverse_step, k0, gamma, shear_to_bulk, shear_factor,
-            rate_eta, rate_n, pore_gas, ring, u, s[LXX], s[LXZ], s[LZX], s[LZZ], s[DENSITY], s[ZERO_STRESS], s[INITIAL],
-            s[SXX], s[SZZ], s[SXZ], s[PRESSURE], s[SOUND], s[WORK], s[ELASTIC],
-        )  # fmt: skip
-        deform(n, body[4], s[LXX], s[LXZ], s[LZX], s[LZZ], s[DXX], s[DXZ], s[DZX], s[DZZ])
+        for k in range(np.uint64(0), np.uint64(n + images), EIGHT):
+            write_lines(front, k, x, z, u, w, area, area, area, area)
+        last_dt = body[4]  # the velocities are those of the step that moved the particles, so is its length
+        # in blocks: what one pass writes is still in the nearest cache when the next one reads it
+        for block in range(blocks):
+            low = block * BLOCK
+            high = min(low + BLOCK, np.uint64(n))
+            sum_gradients(
+                low, high, x, z, u, w, front, start, stop, neighbour, nearby, h,
+                s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ],
+            )  # fmt: skip
+            renormalise(low, high, s[GXX], s[GXZ], s[GZZ], s[LXX], s[LXZ], s[LZX], s[LZZ])
+            update_stress(
+                low, high, last_dt, axisymmetric, plain, law, strength, tension, ring, u, s[LXX], s[LXZ], s[LZX], s[LZZ],
+                density, s[ZERO_STRESS], s[INITIAL], s[SXX], s[SZZ], s[SXZ], s[PRESSURE], sound, s[WORK], s[COMPRESSIVE],
+                s[TENSILE],
+            )  # fmt: skip
+            deform(low, high, last_dt, s[LXX], s[LXZ], s[LZX], s[LZZ], s[DXX], s[DXZ], s[DZX], s[DZZ])
+            carry_stress(
+                low, high, ring, s[PRESSURE], s[SXX], s[SZZ], s[SXZ], s[GXX], s[GXZ], s[GZZ], s[LXZ], s[LZX],
+                s[MXX], s[MXZ], s[MZX], s[MZZ], s[SHEAR],
+            )  # fmt: skip
         for i in range(n):
-            area[i] = s[MASS, i] / (s[DENSITY, i] * ring[i])
-            s[WEIGHT, i] = s[DENSITY, i] * ring[i]
+            s[WEIGHT, i] = density[i] * ring[i]
+            area[i] = s[MASS, i] / s[WEIGHT, i]
         measure_surface(
-            n, is_rod, tip_radius, body[0], spacing, x, z, s[DXX], s[DXZ], s[DZX], s[DZZ],
+            near, is_rod, tip_radius, body[0], spacing, x, z, s[DXX], s[DXZ], s[DZX], s[DZZ],
             s[DISTANCE], s[NX], s[NZ], s[THICKNESS],
         )  # fmt: skip
         weigh_wall_layer(
-            n, body[4], spacing, wall_weight, s[DISTANCE], s[NX], s[NZ], s[THICKNESS], s[GXX], s[GXZ], s[GZX], s[GZZ],
-            s[LXX], s[LXZ], s[LZX], s[LZZ], s[SXX], s[SZZ], s[SXZ], s[PRESSURE], s[DENSITY], s[WORK],
-        )  # fmt: skip
-        carry_stress(
-            n, ring, s[PRESSURE], s[SXX], s[SZZ], s[SXZ], s[GXX], s[GXZ], s[GZX], s[GZZ],
-            s[MXX], s[MXZ], s[MZX], s[MZZ],
+            near, last_dt, spacing, wall_weight, s[DISTANCE], s[NX], s[NZ], s[THICKNESS], ring, s[GXX], s[GXZ], s[GZZ],
+            s[MXX], s[MXZ], s[MZX], s[MZZ], s[LXX], s[LXZ], s[LZX], s[LZZ], s[SXX], s[SZZ], s[SXZ], s[PRESSURE],
+            density, s[WORK],
         )  # fmt: skip
         if images > 0:
             for k in (AREA, WEIGHT, SOUND, LXX, LZZ, MXX, MZZ):
                 mirror_axis(n, images, source, s[k], 1.0)
-            for k in (LXZ, LZX, MXZ, MZX):
+            for k in (SHEAR, MXZ, MZX):
                 mirror_axis(n, images, source, s[k], -1.0)
             if axisymmetric:
                 for k in range(images):
@@ -118,16 +136,20 @@ def advance(
                     s[MXZ, n + k] *= ratio
                     s[MZX, n + k] *= abs(ratio)
                     s[MZZ, n + k] *= abs(ratio)
+        for k in range(np.uint64(0), np.uint64(n + images), EIGHT):
+            write_lines(front, k, x, z, u, w, area, s[MZZ], s[MZZ], s[MZZ])
+            write_lines(back, k, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ], s[MXX], s[MXZ], s[MZX])
         sum_forces(
-            n, x, z, u, w, area, s[WEIGHT], s[SOUND], s[LXX], s[LXZ], s[LZX], s[LZZ], s[MXX], s[MXZ], s[MZX], s[MZZ],
-            start, neighbour, h, alpha, beta, affine, s[FX], s[FZ], s[HEAT],
+            np.uint64(0), np.uint64(n), x, z, u, w, area, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ],
+            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, alpha, beta, affine,
+            s[FX], s[FZ], s[HEAT],
         )  # fmt: skip
         if axisymmetric:
             for i in range(n):
                 s[FX, i] += area[i] * (s[SXX, i] + s[SZZ, i] + s[PRESSURE, i])
         force = press(
-            n, body[1], spacing, gap, contact_stiffness, friction, s[DISTANCE], s[NX], s[NZ], s[THICKNESS],
-            s[REST_DENSITY], u, w, s[MASS], s[DENSITY], s[SOUND], s[FX], s[FZ], contact,
+            near, body[1], spacing, gap, contact_stiffness, friction, s[DISTANCE], s[NX], s[NZ], s[THICKNESS],
+            s[REST_DENSITY], u, w, s[MASS], density, sound, s[FX], s[FZ], contact,
         )  # fmt: skip
         depth = -body[0]
         outside = 0.0
@@ -140,26 +162,26 @@ def advance(
             speed = -body[1]
             outside += interpolate(abs(speed), speed_knots, speed_force) * speed / (abs(speed) + 1.0e-3)
         held = 0.0
-        free_mass = 0.0
+        for i in fixed:  # keeps its velocity, nought in a drop
+            held -= s[FZ, i]
+            s[FX, i] = 0.0
+            s[FZ, i] = s[MASS, i] * gravity
         heat = 0.0
-        moved = 0.0
+        far = 0
         for i in range(n):
             heat += s[HEAT, i]
-            if wall[i]:  # keeps its velocity, nought in a drop
-                held -= s[FZ, i]
-                x[i] += dt * u[i]
-                z[i] += dt * w[i]
-                moved = max(moved, max(abs(x[i] - origin[0, i]), abs(z[i] - origin[1, i])))
-                continue
-            free_mass += s[MASS, i]
             u[i] += dt * s[FX, i] / s[MASS, i]
             w[i] += dt * (s[FZ, i] / s[MASS, i] - gravity)
             x[i] += dt * u[i]
             z[i] += dt * w[i]
-            if axisymmetric and x[i] < 1.0e-3 * spacing:  # nothing passes the axis
-                x[i] = 1.0e-3 * spacing
-                u[i] = max(u[i], 0.0)
-            moved = max(moved, max(abs(x[i] - origin[0, i]), abs(z[i] - origin[1, i])))
+            dx = x[i] - origin[0, i]
+            dz = z[i] - origin[1, i]
+            far += 1 if dx * dx + dz * dz > allowed * allowed else 0
+        if axisymmetric:
+            for i in inner:  # nothing passes the axis
+                if x[i] < 1.0e-3 * spacing:
+                    x[i] = 1.0e-3 * spacing
+                    u[i] = max(u[i], 0.0)
         row = log[first + step]
         body[1] += dt * ((force + outside) / body_mass - gravity)
         body[0] += dt * body[1]
@@ -174,7 +196,7 @@ def advance(
         row[7] = body[3]
         row[8] = last[8] + dt * contact[0]
         row[9] = last[9] - dt * outside * body[1]
-        if moved > allowed or body[1] >= 0.0 or not (abs(force) < 1.0e300):
+        if far > 0 or abs(body[0] - body_origin) > allowed or body[1] >= 0.0 or not (abs(force) < 1.0e300):
             return step + 1
     return steps
 
@@ -213,28 +235,41 @@ def evolve(
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
     neighbours = Neighbours(2 * h, skin)
-    state = np.zeros((dust.shape[0], n + 8))
+    state = np.zeros((dust.shape[0], n + WIDTH))
+    front, back = make_lines(n + WIDTH), make_lines(n + WIDTH)
     state[:, :n] = dust
     per_unit = 2 * math.pi if axisymmetric else 1.0
     force_scale = 1 / per_unit
     strength, tension = tabulate_strengths(material, setting.strength_shape)
     depth_law = _split(setting.force_of_depth, force_scale)
     speed_law = _split(setting.force_of_speed, force_scale)
+    law = (
+        setting.monomer_density, material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk,
+        material.shear_factor, setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
+    )  # fmt: skip
+    plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
+    extras = () if plain else (1,)  # two types, so two compiled versions
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[0], -body[1]
+    fixed = np.nonzero(wall)[0].astype(np.uint32)
+    free_mass = float(dust[rows.MASS, ~wall].sum())
     made, builds, stop_step, limit = 0, 0, None, setting.duration
     farthest = 1000 * (np.abs(dust[[rows.X, rows.Z]]).max() + setting.spacing)
     while body[2] < limit:
         if not np.abs(state[[rows.X, rows.Z], :n]).max() < farthest:
             raise _blown_up(setting, made, body[2])
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
-        if n + source.size > state.shape[1]:
-            state = np.concatenate([state[:, :n], np.zeros((state.shape[0], source.size + 64))], axis=1)
+        if n + source.size + WIDTH > state.shape[1]:
+            front, back = (make_lines(n + source.size + 64 + WIDTH) for _ in range(2))
+            state = np.concatenate(
+                [state[:, :n], np.zeros((state.shape[0], source.size + 64 + WIDTH))], axis=1
+            )
         state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
         state[rows.Z, n : n + source.size] = state[rows.Z, source]
         neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
         builds += 1
         origin = state[[rows.X, rows.Z], :n].copy()
+        near, inner, body_origin = _find_near(state[:, :n], projectile, setting.spacing, body[0], skin)
         fresh = True
         while fresh and body[2] < limit:
             if made + steps_at_once + 2 > len(log):
@@ -242,13 +277,13 @@ def evolve(
             left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, n, axisymmetric, source, twice_plane, wall, neighbours.start, neighbours.list, origin, 0.45 * skin, steps,
-                log, made + 1, body, projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
+                state, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
+                neighbours.start, neighbours.list, origin, 0.45 * skin, steps, log, made + 1, body,
+                projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
-                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness, material.contact_friction, setting.side_friction * force_scale,
-                *depth_law, *speed_law, setting.monomer_density, strength, tension, (TABLE_SIZE - 1) / TABLE_TOP,
-                material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk, material.shear_factor,
-                setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
+                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness,
+                material.contact_friction, setting.side_friction * force_scale,
+                *depth_law, *speed_law, law, extras, strength, tension,
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():
                 raise _blown_up(setting, made + max(done, 0), body[2])
@@ -260,13 +295,21 @@ def evolve(
                 at_stop = state[:, :n].copy()
             if stop_step is not None:
                 fresh = fresh or (
-                    body[1] >= 0.0 and np.abs(state[[rows.X, rows.Z], :n] - origin).max() < 0.45 * skin
+                    body[1] >= 0.0
+                    and np.abs(state[[rows.X, rows.Z], :n] - origin).max() < 0.45 * skin
+                    and abs(body[0] - body_origin) < 0.45 * skin
                 )
             if watch is not None:
+                _fill_elastic(setting, state[:, :n])
                 watch(float(body[2]), state[:, :n])
+    end = state[:, :n]
+    if stop_step is None:
+        at_stop = end.copy()
+    for each in (end, at_stop):
+        _fill_elastic(setting, each)
     return Evolution(
-        state[:, :n],
-        at_stop if stop_step is not None else state[:, :n].copy(),
+        end,
+        at_stop,
         log[: made + 1],
         stop_step,
         builds,
@@ -293,7 +336,34 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
 
 
 def _blown_up(setting: DropSetting, steps: int, reached: float) -> SimulationError:
-    return SimulationError("simulation", "run", f"blew up after {steps} steps at {reached * 1e3:.4g} ms with {setting}")
+    return SimulationError(
+        "simulation", "run", f"blew up after {steps} steps at {reached * 1e3:.4g} ms with {setting}"
+    )
+
+
+def _fill_elastic(setting: DropSetting, state: FloatArray) -> None:
+    """Elastic energy per mass is a function of the state, so it is worked out only where somebody looks."""
+    stress = (state[k] for k in (rows.SXX, rows.SZZ, rows.SXZ))
+    state[rows.ELASTIC] = elastic_energy(
+        state[rows.DENSITY], state[rows.ZERO_STRESS], *stress, setting.material, setting.monomer_density
+    )
+
+
+def _find_near(
+    state: FloatArray, projectile: Projectile, spacing: float, tip: float, skin: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Particles that can come within two spacings of the projectile, or to the axis, before the next list; and the tip now."""
+    x, z = np.abs(state[rows.X]), state[rows.Z]
+    margin = 2 * spacing + skin
+    above = z - tip - projectile.tip_radius
+    beside = (above > 0) & (projectile.tip == "hemisphere")
+    distance = np.where(beside, x, np.hypot(x, above)) - projectile.tip_radius
+    state[rows.DISTANCE] = 1.0e9
+    return (
+        np.nonzero(distance < margin)[0].astype(np.uint32),
+        np.nonzero(x < spacing)[0].astype(np.uint32),
+        float(tip),
+    )
 
 
 def _find_images(x: FloatArray, near: float, mirrors: tuple[float, ...]) -> tuple[np.ndarray, FloatArray]:

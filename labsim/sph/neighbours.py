@@ -31,29 +31,29 @@ def sort_into_cells(n, x, z, x0, z0, size, nx, nz, cell_start, order, cell_of):
 
 
 @compiled_entry
-def list_neighbours(n, x, z, reach, x0, z0, size, nx, nz, cell_start, order, start, out):
-    """Neighbours within ``reach`` of particles 0..n-1 among all sorted points. Returns the length used (or needed)."""
+def list_neighbours(n, x, z, xs, zs, reach, x0, z0, size, nx, nz, cell_start, order, start, out):
+    """Neighbours within ``reach`` of particles 0..n-1 among all sorted points (xs, zs in the order of ``order``). Returns the
+    length used, or -1 where ``out`` may be too short. Every candidate is written and kept by moving on: no branch to guess."""
     reach2 = reach * reach
     used = 0
     span = int(reach / size) + 1
     for i in range(n):
         start[i] = used
-        a = min(max(int((x[i] - x0) / size), 0), nx - 1)
-        b = min(max(int((z[i] - z0) / size), 0), nz - 1)
+        xi, zi = x[i], z[i]
+        a = min(max(int((xi - x0) / size), 0), nx - 1)
+        b = min(max(int((zi - z0) / size), 0), nz - 1)
         for cz in range(max(b - span, 0), min(b + span, nz - 1) + 1):
             first = cell_start[cz * nx + max(a - span, 0)]
             last = cell_start[cz * nx + min(a + span, nx - 1) + 1]
+            if used + last - first + 8 > out.size:
+                return -1
             for k in range(first, last):
-                j = order[k]
-                dx = x[i] - x[j]
-                dz = z[i] - z[j]
-                if dx * dx + dz * dz < reach2:
-                    if used < out.size:
-                        out[used] = j
-                    used += 1
+                dx = xi - xs[k]
+                dz = zi - zs[k]
+                out[used] = order[k]
+                used += 1 if dx * dx + dz * dz < reach2 else 0
         while used % 8 != 0:
-            if used < out.size:
-                out[used] = i
+            out[used] = i
             used += 1
     start[n] = used
     return used
@@ -78,10 +78,8 @@ class Neighbours:
         sort_into_cells(m, x, z, x0, z0, size, nx, nz, cell_start, order, np.empty(m, dtype=np.int64))
         if self.start.size != n + 1:
             self.start = np.empty(n + 1, dtype=np.int64)
-        while True:
-            used = list_neighbours(
-                n, x, z, reach, x0, z0, size, nx, nz, cell_start, order, self.start, self.list
-            )
-            if used <= self.list.size:
-                return
-            self.list = np.empty(int(used * 1.2) + 8, dtype=np.uint32)
+        xs, zs = x[order], z[order]
+        while list_neighbours(
+            n, x, z, xs, zs, reach, x0, z0, size, nx, nz, cell_start, order, self.start, self.list
+        ) < 0:  # fmt: skip
+            self.list = np.empty(int(self.list.size * 1.3) + 40 * n, dtype=np.uint32)

@@ -9,96 +9,110 @@ from __future__ import annotations
 import math
 
 from ._jit import compiled
+from .lines import ROOM, read_eight, read_five, read_six
 
 GRADIENT_NORM = -35.0 / (4.0 * math.pi)
 
 
 @compiled
-def sum_gradients(n, x, z, vx, vz, area, start, neighbour, h, gxx, gxz, gzz, lxx, lxz, lzx, lzz):
-    """Raw gradient sums at particles 0..n-1: Σ A_j (x_j - x_i) ∇W into g.. and Σ A_j (v_j - v_i) ∇W into l.. .
+def sum_gradients(
+    low, high, x, z, vx, vz, front, start, stop, neighbour, near, h, gxx, gxz, gzz, lxx, lxz, lzx, lzz
+):  # fmt: skip
+    """Raw gradient sums at particles low..high-1: Σ A_j (x_j - x_i) ∇W into g.. and Σ A_j (v_j - v_i) ∇W into l.. .
 
-    l<a><b> is the derivative of velocity component a along b before renormalisation.
+    l<a><b> is the derivative of velocity component a along b before renormalisation. front: lines (x, z, u, w, A, ...);
+    near: (8, ROOM), what is worked on.
     """
     inverse_2h = 0.5 / h
     norm = GRADIENT_NORM / h**4
-    for i in range(n):
+    for i in range(low, high):
         xi, zi, ui, wi = x[i], z[i], vx[i], vz[i]
         sxx = sxz = szz = 0.0
         dxx = dxz = dzx = dzz = 0.0
-        for k in range(start[i], start[i + 1]):
-            j = neighbour[k]
-            dx = xi - x[j]
-            dz = zi - z[j]
-            s = max(0.0, 1.0 - math.sqrt(dx * dx + dz * dz) * inverse_2h)
-            f = norm * s * s * s * area[j]
-            fx = f * dx
-            fz = f * dz
-            sxx -= dx * fx
-            sxz -= dx * fz
-            szz -= dz * fz
-            du = vx[j] - ui
-            dw = vz[j] - wi
-            dxx += du * fx
-            dxz += du * fz
-            dzx += dw * fx
-            dzz += dw * fz
-        gxx[i] = sxx
-        gxz[i] = sxz
-        gzz[i] = szz
-        lxx[i] = dxx
-        lxz[i] = dxz
-        lzx[i] = dzx
-        lzz[i] = dzz
+        first = start[i]
+        while first < stop[i]:
+            count = min(stop[i] - first, ROOM)
+            for k in range(0, count, 8):
+                read_five(front, neighbour, first + k, near, k)
+            for k in range(count):
+                dx = xi - near[0, k]
+                dz = zi - near[1, k]
+                s = max(0.0, 1.0 - math.sqrt(dx * dx + dz * dz) * inverse_2h)
+                f = s * s * s * near[4, k]
+                fx = f * dx
+                fz = f * dz
+                sxx += dx * fx
+                sxz += dx * fz
+                szz += dz * fz
+                du = near[2, k] - ui
+                dw = near[3, k] - wi
+                dxx += du * fx
+                dxz += du * fz
+                dzx += dw * fx
+                dzz += dw * fz
+            first += count
+        gxx[i] = -norm * sxx
+        gxz[i] = -norm * sxz
+        gzz[i] = -norm * szz
+        lxx[i] = norm * dxx
+        lxz[i] = norm * dxz
+        lzx[i] = norm * dzx
+        lzz[i] = norm * dzz
 
 
 @compiled
 def sum_forces(
-    n, x, z, vx, vz, area, weight, sound, lxx, lxz, lzx, lzz, mxx, mxz, mzx, mzz, start, neighbour, h,
-    alpha, beta, affine, fx_out, fz_out, heat,
+    low, high, x, z, vx, vz, area, weight, sound, lxx, shear, lzz, mxx, mxz, mzx, mzz, front, back, start, stop, neighbour,
+    near, beyond, h, alpha, beta, affine, fx_out, fz_out, heat,
 ):  # fmt: skip
-    """Force on particles 0..n-1 (per radian, or per metre in the plane), and the heating by artificial viscosity.
+    """Force on particles low..high-1 (per radian, or per metre in the plane), and the heating by artificial viscosity.
 
     f_i = A_i Σ_j A_j (M_i + M_j - q_ij) ∇W, with M = ring radius · stress · renormalisation, so that Σ f·v is minus the
     power of the stresses on the very gradients that sum_gradients gives. q_ij acts on that part of the velocity
     difference of a pair that the particles' own linear velocity field (share ``affine``) does not explain.
-    weight = density times ring radius.
+    weight = density times ring radius, shear = lxz + lzx. front: lines (x, z, u, w, A, Mzz, ...); back: lines
+    (weight, sound, lxx, shear, lzz, Mxx, Mxz, Mzx); near, beyond: (8, ROOM), what is worked on.
     """
     inverse_2h = 0.5 / h
     norm = GRADIENT_NORM / h**4
     floor = 0.01 * h * h
-    for i in range(n):
+    half = 0.5 * affine
+    linear = -0.25 * alpha * h
+    square = -0.5 * beta * h * h
+    for i in range(low, high):
         xi, zi, ui, wi = x[i], z[i], vx[i], vz[i]
         axx, axz, azx, azz = mxx[i], mxz[i], mzx[i], mzz[i]
-        ixx, ixz, izx, izz = lxx[i], lxz[i], lzx[i], lzz[i]
+        ixx, ixz, izz = lxx[i], shear[i], lzz[i]
         ci, wti = sound[i], weight[i]
         sx = sz = 0.0
         power = 0.0
-        for k in range(start[i], start[i + 1]):
-            j = neighbour[k]
-            dx = xi - x[j]
-            dz = zi - z[j]
-            d2 = dx * dx + dz * dz
-            s = max(0.0, 1.0 - math.sqrt(d2) * inverse_2h)
-            f = norm * s * s * s * area[j]
-            fx = f * dx
-            fz = f * dz
-            du = ui - vx[j]
-            dw = wi - vz[j]
-            jump = du * dx + dw * dz
-            jump -= (
-                affine
-                * 0.5
-                * (
-                    (ixx + lxx[j]) * dx * dx
-                    + (ixz + lxz[j] + izx + lzx[j]) * dx * dz
-                    + (izz + lzz[j]) * dz * dz
+        first = start[i]
+        while first < stop[i]:
+            count = min(stop[i] - first, ROOM)
+            for k in range(0, count, 8):
+                read_six(front, neighbour, first + k, near, k)
+                read_eight(back, neighbour, first + k, beyond, k)
+            for k in range(count):
+                dx = xi - near[0, k]
+                dz = zi - near[1, k]
+                d2 = dx * dx + dz * dz
+                s = max(0.0, 1.0 - math.sqrt(d2) * inverse_2h)
+                f = s * s * s * near[4, k]
+                fx = f * dx
+                fz = f * dz
+                du = ui - near[2, k]
+                dw = wi - near[3, k]
+                jump = du * dx + dw * dz
+                jump -= half * (
+                    ((ixx + beyond[2, k]) * dx + (ixz + beyond[3, k]) * dz) * dx
+                    + (izz + beyond[4, k]) * dz * dz
                 )
-            )
-            mu = h * jump / (d2 + floor)
-            q = 0.5 * (wti + weight[j]) * (-alpha * 0.5 * (ci + sound[j]) - beta * abs(mu)) * mu
-            sx += (axx + mxx[j] - q) * fx + (axz + mxz[j]) * fz
-            sz += (azx + mzx[j]) * fx + (azz + mzz[j] - q) * fz
-            power += q * (fx * du + fz * dw)
-        fx_out[i] = area[i] * sx
-        fz_out[i] = area[i] * sz
-        heat[i] = 0.5 * area[i] * power
+                mu = jump / (d2 + floor)
+                q = (wti + beyond[0, k]) * (linear * (ci + beyond[1, k]) + square * abs(mu)) * mu
+                sx += (axx + beyond[5, k] - q) * fx + (axz + beyond[6, k]) * fz
+                sz += (azx + beyond[7, k]) * fx + (azz + near[5, k] - q) * fz
+                power += q * (fx * du + fz * dw)
+            first += count
+        fx_out[i] = norm * area[i] * sx
+        fz_out[i] = norm * area[i] * sz
+        heat[i] = 0.5 * norm * area[i] * power

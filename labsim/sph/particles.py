@@ -10,12 +10,13 @@ from .setting import DropSetting
 
 ROWS = (
     "x z u w mass area ring weight sound density zero_stress initial sxx szz sxz pressure work elastic heat "
-    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz gzx distance nx nz thickness rest_density"
+    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz shear distance nx nz "
+    "thickness rest_density compressive tensile"
 ).split()
 (
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
-    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, GZX,
-    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY,
+    HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, SHEAR,
+    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY, COMPRESSIVE, TENSILE,
 ) = range(len(ROWS))  # fmt: skip
 
 WALL_LAYERS = 3  # of particles held still at the sides and the bottom

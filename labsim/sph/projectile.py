@@ -62,17 +62,13 @@ def interpolate(at, knots, values):
 
 @compiled
 def measure_surface(
-    n, is_rod, tip_radius, tip_z, spacing, x, z, dxx, dxz, dzx, dzz, distance, nx, nz, thickness
+    near, is_rod, tip_radius, tip_z, spacing, x, z, dxx, dxz, dzx, dzz, distance, nx, nz, thickness
 ):
     """Distance to the projectile's surface, its normal into the dust, and the share of its width that each particle's cell
-    has kept along that normal. Particles farther than two spacings only get a large distance."""
+    has kept along that normal, for the particles ``near``. Beyond two spacings it only gets a large distance."""
     centre = tip_z + tip_radius
-    near = 2.0 * spacing
-    far = tip_radius + near
-    for i in range(n):
+    for i in near:
         distance[i] = 1.0e9
-        if abs(x[i]) > far or z[i] < tip_z - near:
-            continue
         if is_rod and z[i] > centre:
             a = 1.0 if x[i] > 0.0 else -1.0
             b = 0.0
@@ -82,7 +78,7 @@ def measure_surface(
             b = z[i] - centre
             length = math.sqrt(a * a + b * b)
             d = length - tip_radius
-            if d > near or length == 0.0:
+            if d > 2.0 * spacing or length == 0.0:
                 continue
             a /= length
             b /= length
@@ -94,26 +90,26 @@ def measure_surface(
 
 @compiled
 def weigh_wall_layer(
-    n, dt, spacing, weight, distance, nx, nz, thickness, bxx, bxz, bzx, bzz,
+    near, dt, spacing, weight, distance, nx, nz, thickness, ring, bxx, bxz, bzz, mxx, mxz, mzx, mzz,
     lxx, lxz, lzx, lzz, sxx, szz, sxz, pressure, density, work,
 ):  # fmt: skip
     """Reduce the normal part of the gradient that carries the stress of particles lying against the projectile to
-    ``weight``: B <- (I - (1 - weight) n n) B. Fades out between 1.3 and 2 half thicknesses from the surface. The stress
+    ``weight``: B <- (I - (1 - weight) n n) B in M. Fades out between 1.3 and 2 half thicknesses from the surface. The stress
     power booked for them is reduced alike; the contact books what the dust between them and the surface takes."""
-    for i in range(n):
+    for i in near:
         if distance[i] < 2.0 * spacing:
             half = 0.5 * spacing * thickness[i]
             share = (1.0 - weight) * min(max((2.0 * half - distance[i]) / (0.7 * half), 0.0), 1.0)
             if share > 0.0:
                 a, b = nx[i], nz[i]
-                first = a * bxx[i] + b * bzx[i]
-                second = a * bxz[i] + b * bzz[i]
-                bxx[i] -= share * a * first
-                bxz[i] -= share * a * second
-                bzx[i] -= share * b * first
-                bzz[i] -= share * b * second
                 traction_x = (sxx[i] - pressure[i]) * a + sxz[i] * b
                 traction_z = sxz[i] * a + (szz[i] - pressure[i]) * b
+                first = share * ring[i] * (a * bxx[i] + b * bxz[i])
+                second = share * ring[i] * (a * bxz[i] + b * bzz[i])
+                mxx[i] -= traction_x * first
+                mxz[i] -= traction_x * second
+                mzx[i] -= traction_z * first
+                mzz[i] -= traction_z * second
                 work[i] -= (
                     dt * share / density[i]
                     * (traction_x * (lxx[i] * a + lxz[i] * b) + traction_z * (lzx[i] * a + lzz[i] * b))
@@ -122,7 +118,7 @@ def weigh_wall_layer(
 
 @compiled
 def press(
-    n, speed_z, spacing, gap, stiffness, friction, distance, nx, nz, thickness, rest_density,
+    near, speed_z, spacing, gap, stiffness, friction, distance, nx, nz, thickness, rest_density,
     u, w, mass, density, sound, fx, fz, energy,
 ):  # fmt: skip
     """Add contact forces to fx, fz; return the force on the projectile along z (per radian or metre).
@@ -133,7 +129,7 @@ def press(
     force = 0.0
     taken = 0.0
     lost = 0.0
-    for i in range(n):
+    for i in near:
         if distance[i] < spacing:
             reach = gap * spacing * math.sqrt(thickness[i] * min(rest_density[i] / density[i], 1.0))
             overlap = reach - distance[i]

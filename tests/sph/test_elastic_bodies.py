@@ -29,7 +29,11 @@ def oscillate_plate(thickness_in_particles):
     m, n = math.cos(1.875) + math.cosh(1.875), math.sin(1.875) + math.sinh(1.875)
     shape = m * (np.cosh(s) - np.cos(s)) - n * (np.sinh(s) - np.sin(s))
     state[rows.W] = (
-        0.002 * math.sqrt(bulk / 1000) * shape / np.abs(shape).max() * np.sign(shape[np.argmax(state[rows.X])])
+        0.002
+        * math.sqrt(bulk / 1000)
+        * shape
+        / np.abs(shape).max()
+        * np.sign(shape[np.argmax(state[rows.X])])
     )
     tip = state[rows.X] > length - 1.1 * spacing
     rest = state[rows.Z, tip].mean()
@@ -122,14 +126,16 @@ def test_stress_turns_with_the_body():
 
     material = elastic_material(45e3, 0.5)
     strength, tension = dust.tabulate_strengths(material)
-    row = {name: np.zeros(1) for name in "sxz pressure sound work elastic zero lxx lzz vr".split()}
+    row = {
+        name: np.zeros(1) for name in "sxz pressure sound work compressive tensile zero lxx lzz vr".split()
+    }
     sxx, szz, rho, one = np.array([100.0]), np.array([-40.0]), np.array([300.0]), np.ones(1)
     steps = 20000
     for _ in range(steps):
         dust.update_stress(
-            1, 1.0 / steps, False, 2000.0, strength, tension, (dust.TABLE_SIZE - 1) / dust.TABLE_TOP,
-            45e3, 4.0, 0.5, 1.0, 0.0, 1.0, 0.0, one, row["vr"], row["lxx"], -0.5 * np.pi * one, 0.5 * np.pi * one, row["lzz"],
-            rho, 0.15 * one, 0.15 * one, sxx, szz, row["sxz"], row["pressure"], row["sound"], row["work"], row["elastic"],
+            0, 1, 1.0 / steps, False, True, (2000.0, 45e3, 4.0, 0.5, 1.0, 0.0, 1.0, 0.0), strength, tension,
+            one, row["vr"], row["lxx"], -0.5 * np.pi * one, 0.5 * np.pi * one, row["lzz"], rho, 0.15 * one, 0.15 * one,
+            sxx, szz, row["sxz"], row["pressure"], row["sound"], row["work"], row["compressive"], row["tensile"],
         )  # fmt: skip
     assert sxx[0] == pytest.approx(-40.0, abs=0.1)
     assert szz[0] == pytest.approx(100.0, abs=0.1)

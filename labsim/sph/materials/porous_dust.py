@@ -78,59 +78,83 @@ def zero_stress_filling_factor(phi: FloatArray, pressure: FloatArray, material: 
 
 
 @compiled
-def _raise_to(ratio, gamma):
-    """ratio ** gamma; the exponent of nearly every dust is 4, and two products are far cheaper than a power."""
-    return ratio * ratio * ratio * ratio if gamma == 4.0 else ratio**gamma
+def _raise_to(ratio, gamma, fourth):
+    """ratio ** gamma; the exponent of nearly every dust is 4 (``fourth``), and two products are far cheaper than a power."""
+    return ratio * ratio * ratio * ratio if fourth else ratio**gamma
 
 
 @compiled
-def solve_zero_stress(phi, pressure, k0, gamma):
+def _exponential(y):
+    """e^y to 1e-14 for |y| < 1, without the library call that would keep a loop from being vectorised."""
+    y *= 0.125
+    e = 1.0 + y / 9.0
+    for k in (8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0):
+        e = 1.0 + e * y / k
+    e *= e
+    e *= e
+    return e * e
+
+
+@compiled
+def solve_zero_stress(phi, pressure, k0, gamma, fourth):
     """φ0' with K(φ0') (φ/φ0' - 1) = pressure, by Newton from the explicit estimate φ/(1 + p/K(φ))."""
-    x = phi / (1.0 + pressure / (k0 * _raise_to(phi / 0.15, gamma)))
+    x = phi / (1.0 + pressure / (k0 * _raise_to(phi * (1.0 / 0.15), gamma, fourth)))
     for _ in range(3):
-        k = k0 * _raise_to(x / 0.15, gamma)
+        k = k0 * _raise_to(x * (1.0 / 0.15), gamma, fourth)
         ratio = phi / x
-        x -= (k * (ratio - 1.0) - pressure) / (k / x * (gamma * (ratio - 1.0) - ratio))
+        x -= x * (k * (ratio - 1.0) - pressure) / (k * (gamma * (ratio - 1.0) - ratio))
     return x
 
 
 @compiled
 def update_stress(
-    n, dt, axisymmetric, solid_density, strength_table, tension_table, inverse_step, k0, gamma, shear_to_bulk,
-    shear_factor, rate_eta, rate_n, gas_pressure,
-    r, vr, lxx, lxz, lzx, lzz, rho, phi_zero, phi_initial, sxx, szz, sxz, pressure, sound, work, elastic,
+    low, high, dt, axisymmetric, plain, law, strength_table, tension_table, r, vr, lxx, lxz, lzx, lzz,
+    rho, phi_zero, phi_initial, sxx, szz, sxz, pressure, sound, work, compressive, tensile,
 ):  # fmt: skip
-    """One step of the material: velocity gradient in, density, φ0' and stress out. Plastic state is committed here,
-    once per step. work and elastic: stress power spent so far and elastic energy held, per mass."""
+    """One step of the material for particles low..high-1: velocity gradient in, density, φ0' and stress out. Plastic state is
+    committed here, once per step. work: stress power spent so far, per mass; compressive, tensile: Σ and |T| of each particle.
+
+    law: monomer density, K0, γ, shear_to_bulk, shear_factor, η and n of the rate term, gas pressure.
+    plain: no rate term, no gas, exponent 4 of K. Then the loop has no branch and no call, and is vectorised.
+    """
+    solid_density, k0, gamma, shear_to_bulk, shear_factor, rate_eta, rate_n, gas_pressure = law
+    inverse_step = (TABLE_SIZE - 1) / TABLE_TOP / solid_density
     third = 1.0 / 3.0
+    hoops = 1.0 if axisymmetric else 0.0
     top = strength_table.size - 2
-    for i in range(n):
-        hoop = vr[i] / r[i] if axisymmetric else 0.0
-        div = lxx[i] + lzz[i] + hoop
-        rho_old = rho[i]
-        p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
-        rho_new = rho_old * math.exp(-div * dt)
-        phi = rho_new / solid_density
-        position = phi * inverse_step
-        cell = min(max(int(position), 0), top)
+    inverse_solid = 1.0 / solid_density
+    # three loops, because one that looks up a table cannot be vectorised
+    for i in range(low, high):
+        rho[i] *= _exponential(-dt * (lxx[i] + lzz[i] + hoops * vr[i] / r[i]))
+    for i in range(low, high):
+        position = rho[i] * inverse_step
+        cell = np.uint64(min(max(int(position), 0), top))
         part = position - cell
-        strength = strength_table[cell] + part * (strength_table[cell + 1] - strength_table[cell])
-        tension = tension_table[cell] + part * (tension_table[cell + 1] - tension_table[cell])
-        if rate_eta > 0.0 and div < 0.0:
+        below, above = strength_table[cell], strength_table[cell + np.uint64(1)]
+        compressive[i] = below + part * (above - below)
+        below, above = tension_table[cell], tension_table[cell + np.uint64(1)]
+        tensile[i] = below + part * (above - below)
+    for i in range(low, high):
+        hoop = hoops * vr[i] / r[i]
+        div = lxx[i] + lzz[i] + hoop
+        rho_new = rho[i]
+        rho_old = rho_new / _exponential(-div * dt)
+        phi = rho_new * inverse_solid
+        strength, tension = compressive[i], tensile[i]
+        p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
+        if not plain and rate_eta > 0.0 and div < 0.0:
             strength *= 1.0 + rate_eta * (-div) ** rate_n
         x = phi_zero[i]
-        k = k0 * _raise_to(x / 0.15, gamma)
-        p = k * (phi / x - 1.0)
-        if p > strength:
-            p = strength
-            x = solve_zero_stress(phi, p, k0, gamma)
-            k = k0 * _raise_to(x / 0.15, gamma)
-            phi_zero[i] = x
-        elif p < -tension:
-            p = -tension
-            x = solve_zero_stress(phi, p, k0, gamma)
-            k = k0 * _raise_to(x / 0.15, gamma)
-            phi_zero[i] = x
+        k = k0 * _raise_to(x * (1.0 / 0.15), gamma, plain)
+        trial = k * (phi / x - 1.0)
+        p = min(max(trial, -tension), strength)
+        if plain:
+            moved = solve_zero_stress(phi, p, k0, gamma, plain)
+            x = moved if p != trial else x
+        elif p != trial:
+            x = solve_zero_stress(phi, p, k0, gamma, plain)
+        k = k0 * _raise_to(x * (1.0 / 0.15), gamma, plain)
+        phi_zero[i] = x
         shear = shear_to_bulk * k
         exx = lxx[i] - div * third
         ezz = lzz[i] - div * third
@@ -139,36 +163,38 @@ def update_stress(
         a = sxx_old + dt * (2.0 * shear * exx + 2.0 * spin * sxz_old)
         c = szz_old + dt * (2.0 * shear * ezz - 2.0 * spin * sxz_old)
         b = sxz_old + dt * (2.0 * shear * exz + spin * (szz_old - sxx_old))
+        q2 = 1.5 * (a * a + c * c + (a + c) * (a + c)) + 3.0 * b * b
+        yield2 = shear_factor * shear_factor * strength * tension
+        f = math.sqrt(yield2 / max(max(q2, yield2), 1.0e-300))
+        a *= f
+        b *= f
+        c *= f
         h = -(a + c)
-        q = math.sqrt(1.5 * (a * a + c * c + h * h) + 3.0 * b * b)
-        yield_stress = shear_factor * math.sqrt(strength * tension)
-        if q > yield_stress:
-            f = yield_stress / q
-            a *= f
-            b *= f
-            c *= f
-            h *= f
         sxx[i], szz[i], sxz[i] = a, c, b
-        gas = 0.0
-        if gas_pressure > 0.0:
-            gas = gas_pressure * ((1.0 - phi_initial[i]) / (1.0 - phi) - 1.0)
-        total = p + gas
-        pressure[i] = total
-        rho[i] = rho_new
+        total = p
         stiffness = k * phi / x * (1.0 + 4.0 * third * shear_to_bulk)
-        if gas_pressure > 0.0:
+        if not plain and gas_pressure > 0.0:
+            total += gas_pressure * ((1.0 - phi_initial[i]) / (1.0 - phi) - 1.0)
             stiffness += gas_pressure * phi * (1.0 - phi_initial[i]) / (1.0 - phi) ** 2
+        pressure[i] = total
         sound[i] = math.sqrt(stiffness / rho_new)
         h_old = -(sxx_old + szz_old)
         work[i] += (
             dt * (
-                -0.5 * (p_old + total) * div
-                + 0.5 * (sxx_old + a) * exx + 0.5 * (szz_old + c) * ezz + (sxz_old + b) * exz
-                + 0.5 * (h_old + h) * (hoop - div * third)
-            ) / (0.5 * (rho_old + rho_new))
+                -(p_old + total) * div
+                + (sxx_old + a) * exx + (szz_old + c) * ezz + 2.0 * (sxz_old + b) * exz
+                + (h_old + h) * (hoop - div * third)
+            ) / (rho_old + rho_new)
         )  # fmt: skip
-        ratio = phi / x
-        elastic[i] = (
-            k / (solid_density * x) * (math.log(ratio) + 1.0 / ratio - 1.0)
-            + (a * a + c * c + h * h + 2.0 * b * b) / (4.0 * shear * rho_new)
-        )  # fmt: skip
+
+
+def elastic_energy(
+    density: FloatArray, zero_stress: FloatArray, sxx: FloatArray, szz: FloatArray, sxz: FloatArray,
+    material: Material, monomer_density: float,
+) -> FloatArray:  # fmt: skip
+    """Elastic energy held per mass, J/kg: of the volume between φ0' and φ, and of the deviatoric stress."""
+    k = bulk_modulus(zero_stress, material)
+    ratio = density / (monomer_density * zero_stress)
+    shape = sxx**2 + szz**2 + (sxx + szz) ** 2 + 2.0 * sxz**2
+    volume = k / (monomer_density * zero_stress) * (np.log(ratio) + 1.0 / ratio - 1.0)
+    return volume + shape / (4.0 * material.shear_to_bulk * k * density)
