@@ -195,10 +195,10 @@ def check_track_file(path: Path, camera: Camera) -> None:
     surface_row = camera.surface_row
     if find_format(path) is not None:
         try:
-            rows = read_rows(path, camera).row
+            found = read_rows(path, camera)
         except MeasurementError as trouble:
             raise CampaignError(trouble.where, trouble.key, trouble.message) from None
-        _check_surface_reached(path, "rows", float(rows.max()), surface_row)
+        _check_surface_reached(path, "rows", float(found.row.max()), surface_row)
         return
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
