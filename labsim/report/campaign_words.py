@@ -171,7 +171,8 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
     if compared:
         words.append(
             f"The maps of {_list_names(compared)} are part of the likelihood. Simulated dust is seen through the own cells "
-            "and the blur of the scan; only cells that are compared carry a simulated value."
+            "and the blur of the scan, in the frame of the tip: moved so that its deepest tip lies where the bead ends. Only "
+            "cells that are compared carry a simulated value."
         )
     only = [view.name for view in maps if view.name not in used]
     if only:

@@ -38,11 +38,11 @@ class MapView:
 def view_maps(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[MapView]:
     """Every scan of the likelihood; simulated dust is seen through the scan's own cells, blur and grey level."""
     views = []
-    for scan in bench.scans:
+    for number, scan in enumerate(bench.scans):
         observed = scan.observed
         simulated = {}
         for name, fit in fits:
-            code = scan.table.code(fit.log_p_m, scan.log_speed, fit.values)
+            code = scan.table.code(fit.log_p_m, fit.scan_speeds[number], fit.values)
             scale = bench.instruments(fit.values)[observed.name].ct_scale
             full = np.full(observed.cells.shape, np.nan)
             full[observed.cells] = scale * code[1:]
