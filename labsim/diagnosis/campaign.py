@@ -17,13 +17,13 @@ from ..inference.runs import Progress, RunStore
 from ..records import Campaign
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
-from .screen import Screening, screen, screen_pairs
+from .screen import Score, Screening, screen, screen_pairs
 from .shapes import lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
-MOST_RERUN = 6  # effects that cost runs
+MOST_RERUN = 5  # effects that cost runs
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -172,26 +172,42 @@ def diagnose_campaign(
     )
 
 
-def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> list[Fit]:
-    """Re-simulate the effects that the screening cannot exclude; effects of the measurement cost nothing and are all fitted."""
+def confirm_singles(
+    bench: Workbench, nominal: Fit, screening: Screening, explored: dict[str, Fit]
+) -> list[Fit]:
+    """Re-simulate the effects that screening and exploring cannot exclude; those of the measurement cost nothing and are all
+    fitted."""
     if not screening.scores:
         return []
-    top = screening.scores[0].log_bayes
-    close = [score for score in screening.scores if score.log_bayes > max(top - CLOSE, WORTHWHILE)]
+    promise = {score.name: score.log_bayes for score in screening.scores}
+    for name, fit in explored.items():
+        promise[name] = fit.evidence - nominal.evidence
+    ranked = sorted(screening.scores, key=lambda score: -promise[score.name])
+    free = [score for score in ranked if not bench.costs_runs(score.name)]
+    fits = [_fit_from_score(bench, nominal, score) for score in free]
+    top = max([promise[ranked[0].name], *(fit.evidence - nominal.evidence for fit in fits)])
     costly = [
         score
-        for score in close
+        for score in ranked
         if bench.costs_runs(score.name)
+        and promise[score.name] > max(top - CLOSE, WORTHWHILE)
         # finer runs for a suspicion of coarseness only where nothing else explains as much
-        and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
+        and (bench.effects[score.name].kind != "numerics" or score is ranked[0])
     ][:MOST_RERUN]
-    free = [score for score in screening.scores if not bench.costs_runs(score.name)]
-    fits = []
-    for score in [*free, *costly]:
-        reach = 2 * abs(bench.effects[score.name].amplitudes[0].step)
-        start = float(np.clip(score.amplitude, -reach, reach))
-        fits.append(fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start})))
+    for score in costly:
+        start = explored.get(score.name)
+        if start is None:
+            fits.append(_fit_from_score(bench, nominal, score))
+        else:
+            begin = (start.log_p_m, start.values)
+            fits.append(fit_hypothesis(bench, (score.name,), begin, nuisances=start))
     return fits
+
+
+def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:
+    reach = 2 * abs(bench.effects[score.name].amplitudes[0].step)
+    start = float(np.clip(score.amplitude, -reach, reach))
+    return fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start}))
 
 
 def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening) -> list[Fit]:

@@ -93,7 +93,11 @@ def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
 
 
 def merge_variants(
-    bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening
+    bench: Workbench,
+    nominal: Fit,
+    fits: Sequence[Fit],
+    screening: Screening,
+    explored: Mapping[str, Fit],
 ) -> tuple[list[Fit], Screening]:
     """One fit and one score per cause. The best variant takes the cause's name in the workbench; evidences are averaged."""
     fitted = {fit.hypothesis[0]: fit for fit in fits}
@@ -104,8 +108,7 @@ def merge_variants(
     merged, kept = [], []
     for base, variants in groups.items():
         evidence = {
-            name: fitted[name].evidence if name in fitted else nominal.evidence + scores[name].log_bayes
-            for name in variants
+            name: _evidence(name, fitted, explored, nominal, scores[name].log_bayes) for name in variants
         }
         top = max(evidence.values())
         mean = top + math.log(sum(math.exp(e - top) for e in evidence.values()) / len(variants))
@@ -134,6 +137,16 @@ def merge_variants(
         cosines=screening.cosines[np.ix_(positions, positions)],
         fingerprints=screening.fingerprints[:, positions],
     )
+
+
+def _evidence(
+    name: str, fitted: Mapping[str, Fit], explored: Mapping[str, Fit], nominal: Fit, log_bayes: float
+) -> float:
+    """The best that is known: of a fit with its own runs, of one on fingerprints, of the tangent."""
+    for fits in (fitted, explored):
+        if name in fits:
+            return fits[name].evidence
+    return nominal.evidence + log_bayes
 
 
 def _take_name(bench: Workbench, variant: str, base: str) -> None:

@@ -192,6 +192,13 @@ class Workbench:
             for name, amplitude, index in wanted:
                 self._fill_change(number, index, name, amplitude, cells)
 
+    def require_about(self, name: str, log_p_m: float) -> None:
+        """The base about a strength and a fingerprint of one effect there."""
+        self.require_base(enclosing_nodes(log_p_m))
+        index = screening_node(log_p_m)
+        wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self, name, 0.0)]
+        self.require_changes(wanted, f"{name} at another p_m", coarse=True)
+
     def instruments(self, amplitudes: Mapping[str, float]) -> dict[str, Instrument]:
         made = {}
         for name, place in self.places.items():
@@ -367,6 +374,7 @@ def fit_hypothesis(
     *,
     coarse: bool = False,
     nuisances: Fit | None = None,
+    iterations: int = ITERATIONS,
 ) -> Fit:
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
@@ -379,7 +387,7 @@ def fit_hypothesis(
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
     names = ("ln_p_m", *hypothesis)
-    for iteration in range(ITERATIONS):
+    for iteration in range(iterations):
         _ask(bench, hypothesis, log_p_m, values, coarse=coarse)
         linear = linearise_at(bench, models, speeds, log_p_m, values)
         step, covariance, _chi, _logdet, weighted = solve_globals(
@@ -441,9 +449,10 @@ def _table_number(bench: Workbench, model: DropModel) -> int:
     return find_family(bench.families, model.observed.drop.projectile, is_scan=False)
 
 
-def with_probes(bench: Workbench, fit: Fit, names: Sequence[str]) -> Linearised:
-    """The linearisation of a fit with tangents of further effects at their null."""
-    return linearise_at(bench, fit.models, fit.scan_speeds, fit.log_p_m, fit.values, names)
+def with_probes(bench: Workbench, fit: Fit, names: Sequence[str], log_p_m: float | None = None) -> Linearised:
+    """The linearisation of a fit (or of its nuisances at another p_m) with tangents of further effects at their null."""
+    place = fit.log_p_m if log_p_m is None else log_p_m
+    return linearise_at(bench, fit.models, fit.scan_speeds, place, fit.values, names)
 
 
 def linearise_at(

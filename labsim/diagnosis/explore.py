@@ -1,0 +1,68 @@
+"""Large effects: what a tangent at the nominal fit cannot see because p_m has run away to make up for it.
+
+Where the nominal model fails, every effect that costs runs is fitted by Gauss-Newton on fingerprints (coarse runs), from the
+nominal p_m and from strengths a factor REACH above and below it, the effect's amplitude taken first at that strength. The
+best of the three replaces the tangent's word.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..inference.fitting import Fit, Workbench, fit_hypothesis, with_probes
+from ..inference.likelihood import solve_globals
+from .screen import Screening
+
+REACH = 2.5  # factor on p_m
+FAILED = 0.05  # p value of the nominal model below which it is worth while
+PROMISING = 3.0  # ln Bayes factor of the screening from which it is
+HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed to its end
+FIRST_STEPS = 4
+
+
+def nominal_fails(bench: Workbench, nominal: Fit, screening: Screening) -> bool:
+    freedom = max(nominal.points - 1 - 2 * len(bench.models), 1)
+    best = screening.scores[0].log_bayes if screening.scores else -math.inf
+    return best > PROMISING or chi2.sf(nominal.chi_square, freedom) < FAILED
+
+
+def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, Fit]:
+    """Best coarse fit of every effect that costs runs, by name; empty where the nominal model explains the data."""
+    if not nominal_fails(bench, nominal, screening):
+        return {}
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    starts = [nominal.log_p_m]
+    for shift in (math.log(REACH), -math.log(REACH)):
+        if low <= nominal.log_p_m + shift <= high:
+            starts.append(nominal.log_p_m + shift)
+    found: dict[str, Fit] = {}
+    top = nominal.evidence
+    for score in screening.scores:
+        name = score.name
+        if not bench.costs_runs(name) or bench.effects[name].kind == "numerics":
+            continue
+        for start in starts:
+            first = _start_at(bench, nominal, name, start)
+            fit = fit_hypothesis(
+                bench, (name,), (start, {name: first}), coarse=True, nuisances=nominal, iterations=FIRST_STEPS
+            )
+            if fit.evidence > top - HOPELESS:
+                begin = (fit.log_p_m, fit.values)
+                fit = fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=fit)
+            if name not in found or fit.evidence > found[name].evidence:
+                found[name] = fit
+            top = max(top, fit.evidence)
+    return found
+
+
+def _start_at(bench: Workbench, nominal: Fit, name: str, log_p_m: float) -> float:
+    """Amplitude that the data ask for at a strength, by the tangent there, within two of its steps."""
+    parameter = bench.effects[name].amplitudes[0]
+    bench.require_about(name, log_p_m)
+    linear = with_probes(bench, nominal, [name], log_p_m)
+    step, *_ = solve_globals(linear.blocks, [name], {name: (0.0, parameter.scale)})
+    reach = 2 * abs(parameter.step)
+    return float(np.clip(step[0], -reach, reach))
