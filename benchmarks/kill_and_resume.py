@@ -136,8 +136,9 @@ def main() -> None:
         study = Study(arguments, folder / f"life{life}", given.workers)
         kept = 0
         while True:
+            started = time.monotonic()
             process = study.begin()
-            wait = chance.uniform(1.0, max(0.5 * whole, 4.0)) if kills < given.kills else None
+            wait = chance.uniform(1.0, max(0.7 * whole, 4.0)) if kills < given.kills else None
             try:
                 _, said = process.communicate(timeout=wait)
             except subprocess.TimeoutExpired:
@@ -152,6 +153,8 @@ def main() -> None:
                 kept = stored
                 continue
             break
+        if kept == 0:  # nothing disturbed it: the machine may be freer than it was
+            whole = time.monotonic() - started
         if process.returncode:
             print(f"  life {life} ended with status {process.returncode}: {said.strip()}")
             sys.exit(1)

@@ -1,0 +1,74 @@
+"""A calibration's sweep on one worker, on two, and on a local Dask cluster of two: python benchmarks/scaling.py [--runs 12]
+
+Each arrangement does the same coarse axisymmetric drops into an empty store. ``ratio`` is wall time against one worker;
+on a machine that others use too it says little, so ``busy`` stands beside it: the share of the workers' time that was
+spent within runs. Two workers that are busy 0.95 of the time are worth 1.9 where two cores are free.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from pathlib import Path
+
+from labsim.inference.runs import RunStore
+from labsim.inference.workers import warm_up
+from labsim.records import Material, Projectile
+from labsim.sph import DropSetting
+
+
+def make_sweep(count: int) -> list[DropSetting]:
+    """Drops of a bead at one speed, p_m from 1 to 4 kPa, a/dx = 4, grains ten times softer than usual."""
+    rod = Projectile("hemisphere", 5e-4, 1.33e-6)
+    dust = Material(bulk_modulus=4500.0)
+    return [
+        DropSetting(rod, 0.3, dust.replace(p_m=1000.0 * 4.0 ** (k / max(count - 1, 1))), spacing=5e-4 / 4)
+        for k in range(count)
+    ]
+
+
+def measure(
+    settings: list[DropSetting], folder: Path, workers: int, scheduler: str | None
+) -> tuple[float, float]:
+    """Wall time of the sweep, and the share of its workers' time that was spent within runs."""
+    store = RunStore(folder)
+    began = time.perf_counter()
+    store.get_many(settings, workers=workers, scheduler=scheduler)
+    wall = time.perf_counter() - began
+    return wall, sum(entry.wall for entry in store.index()) / (workers * wall)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--runs", type=int, default=12)
+    given = parser.parse_args()
+    settings = make_sweep(given.runs)
+    warm_up()
+    load = os.getloadavg()[0]
+    rows: list[tuple[str, float, float]] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rows.append(("one worker", *measure(settings, folder / "one", 1, None)))
+        measure(make_sweep(2), folder / "warm", 2, None)  # the processes start and load the compiled solver
+        rows.append(("two processes", *measure(settings, folder / "two", 2, None)))
+        try:
+            from distributed import LocalCluster
+        except ImportError:
+            print("no distributed here: pip install labsim[cluster]")
+        else:
+            with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+                address = cluster.scheduler_address
+                measure(make_sweep(2), folder / "warm dask", 2, address)
+                rows.append(("two Dask workers", *measure(settings, folder / "dask", 2, address)))
+    print(f"{given.runs} runs, {os.cpu_count()} cores, load {load:.1f} of others before")
+    print("| workers | wall | ratio | busy |\n| --- | --- | --- | --- |")
+    for label, wall, busy in rows:
+        print(f"| {label} | {wall:.1f} s | {rows[0][1] / wall:.2f} | {busy:.2f} |")
+
+
+if __name__ == "__main__":
+    main()
