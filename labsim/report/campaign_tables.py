@@ -138,6 +138,21 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
     }
 
 
+MISSING = {
+    "depth and speed": "a law of depth and speed, about {size} % of the depth",
+    "drop": "something that changes from drop to drop, about {size} % of the depth",
+    "undisturbed dust": "a layering of the dust that was there before the drop",
+    "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
+    "speed, about {size} % of the depth",
+}
+
+
+def say_missing(found: Diagnosis) -> str:
+    """What the unnamed law of the best fit depends on, and how large it is."""
+    block = found.unknown.block
+    return MISSING.get(block, f"a law of {block}").format(size=f"{100 * found.unknown.size:.0f}")
+
+
 def say_verdict(found: Diagnosis) -> str:
     """The verdict as one sentence that a laboratory can act on."""
     best, probability = found.verdict.probabilities[0]
@@ -151,7 +166,7 @@ def say_verdict(found: Diagnosis) -> str:
     if found.verdict.word == "unknown":
         return (
             f"The simulation is wrong in a way that no listed cause explains (probability {probability:.2f}): "
-            f"what is missing looks like a law of {found.unknown.block}, about {100 * found.unknown.size:.0f} % of the depth."
+            f"what is missing looks like {say_missing(found)}."
         )
     parts = []
     for name in best:

@@ -13,6 +13,7 @@ from ..inference.fitting import Fit, Workbench
 from ..inference.posterior import Posterior
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
+from .campaign_tables import say_missing
 from .drop_views import DropView
 from .map_views import MapView
 from .page import show_number
@@ -228,7 +229,8 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
 
 
 def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
-    rows, rest = [], []
+    rows: list[dict[str, Any]] = []
+    rest: list[str] = []
     for cause in summary["causes"]:
         name = " + ".join(cause["causes"])
         if cause["probability"] < RARE and rows:
@@ -261,8 +263,8 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
 def _say_unknown(found: Diagnosis) -> str:
     nearest = " + ".join(found.best.hypothesis) or "the nominal model"
     return (
-        f"What is missing looks like a law of {found.unknown.block}, about {100 * found.unknown.size:.0f} % in size; "
-        f"the nearest that the catalogue comes to it is {nearest}, drawn beside the nominal model."
+        f"What is missing looks like {say_missing(found)}; the nearest that the catalogue comes to it is {nearest}, drawn beside "
+        "the nominal model."
     )
 
 

@@ -182,7 +182,7 @@ def plot_map(view: MapView, values: FloatArray, *, difference: bool = False) -> 
         "colorbar": {"thickness": 10, "tickformat": "+.2f" if difference else ".2f", "len": 0.9},
         "hovertemplate": "r %{x:.3f} mm, z %{y:.3f} mm: %{z:.4f}<extra></extra>",
     }  # fmt: skip
-    layout = {
+    layout: Spec = {
         "height": 300,
         "margin": MARGIN | {"r": 4, "t": 10},
         "xaxis": {

@@ -57,10 +57,9 @@ def hash_inputs(campaign: Campaign) -> list[Input]:
         paths.append(folder / "drops" / drop.name / "drop.toml")
         if drop.record.path is not None:
             paths.append(drop.record.path)
-    for scan in (*campaign.scans, *campaign.published_scans):
-        paths.append(folder / "ct" / scan.name / "scan.toml")
-        if hasattr(scan, "slices"):
-            paths.append(scan.slices)
+    for scan in campaign.scans:
+        paths += [folder / "ct" / scan.name / "scan.toml", scan.slices]
+    paths += [folder / "ct" / scan.name / "scan.toml" for scan in campaign.published_scans]
     paths += sorted((folder / "effects").glob("*.py"))
     return [_hash_path(path, folder) for path in dict.fromkeys(paths) if path.exists()]
 
