@@ -27,17 +27,22 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
-from labsim.records import Campaign
+from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 
 CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
 NOT_HIDDEN = ("resolution", "planar_geometry", "gravity")  # no truth of their own here
+VOXEL = 40e-6  # m
 OFF_DEFAULT = 0.8  # hidden shapes are this share of the stated one
 
 
 def open_campaign(drops: str) -> Campaign:
     campaign = read_campaign(CAMPAIGN)
     chosen = [drop for drop in campaign.drops if not drops or drop.name in drops.split(",")]
-    return replace(campaign, drops=tuple(chosen))
+    projectile = chosen[0].projectile
+    bead = Projectile("sphere", projectile.tip_radius, projectile.mass)
+    grey = GreyCalibration(12.0, 0.16, campaign.sample.monomer_density)
+    scan = Scan("C01", bead, Measured(0.8, 0.04), Path(), VOXEL, "top", 8, grey)  # only its undisturbed dust is made
+    return replace(campaign, drops=tuple(chosen), scans=(scan, replace(scan, name="C02")))
 
 
 def judge_hidden(job: tuple[Campaign, Path | None, TruthTable, Hidden, int, float]) -> dict:

@@ -15,6 +15,7 @@ from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..records import Campaign
+from .explore import explore
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Score, Screening, screen, screen_pairs
@@ -96,7 +97,9 @@ def judge_campaign(
     lay_out_shapes(bench)
     screening = screen(bench, nominal, np.random.default_rng(seed))
     unknown = fit_unknown(bench, nominal)
-    rivals, screening = merge_variants(bench, nominal, confirm_singles(bench, nominal, screening), screening)
+    explored = explore(bench, nominal, screening)
+    fits = confirm_singles(bench, nominal, screening, explored)
+    rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
     verdict = judge(
         nominal,
