@@ -62,7 +62,7 @@ def measure_many(
             while waiting or running:
                 while waiting and len(running) < slots:
                     item = waiting.pop(0)
-                    source = item.source if scheduler is None else _pack(item.source)
+                    source = item.source if scheduler is None else (item.name, _pack(item.source))
                     running[executor.submit(measure_one, measure, source, item.given)] = item
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     item = running.pop(future)
@@ -114,18 +114,19 @@ def finish_many(
         )
 
 
-def measure_one(measure: Measure, source: Path | Files, given: dict[str, Any]) -> Files:
-    """What a worker does: the files of one measurement."""
+def measure_one(measure: Measure, source: Path | tuple[str, Files], given: dict[str, Any]) -> Files:
+    """What a worker does: the files of one measurement. source : its folder here, or its name and its files."""
     before = list(_provenance._arguments)
     _provenance.remember([])  # the caller says what made it
     try:
         with tempfile.TemporaryDirectory(prefix="labsim-") as folder:
             target = Path(folder, "out")
             target.mkdir()
-            if isinstance(source, dict):
-                packed, source = source, Path(folder, "in")
-                for name, content in packed.items():
-                    file = source / name
+            if isinstance(source, tuple):
+                name, packed = source
+                source = Path(folder, "in", name)
+                for part, content in packed.items():
+                    file = source / part
                     file.parent.mkdir(parents=True, exist_ok=True)
                     file.write_bytes(content)
             measure(source, target, given)
