@@ -121,10 +121,11 @@ def track_one(
         _take_ruler(request, given["ruler"], 1e-3 * given["ruler_step_mm"])
     seen: video.Tracking | None = None
     frames: video.Frames | None = None
-    if request.source.is_file() and request.source.suffix.lower() in {".csv", ".txt"}:
+    if _is_track_file(request.source):
         rate = _need(request.fps, request.source, "--fps", "give the frame rate with --fps")
         row = request.surface.value if request.surface else float("nan")
-        found = video.read_track(request.source, Camera(rate, 1.0, row, 0.0), request.row_sigma)
+        pixel = request.pixel_size.value if request.pixel_size else float("nan")
+        found = video.read_track(request.source, Camera(rate, pixel, row, 0.0), request.row_sigma)
     else:
         frames = video.open_frames(request.source).turned(given["rotate"])
         if given["part"] is not None:

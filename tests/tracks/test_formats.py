@@ -42,6 +42,7 @@ def write_project(path: Path, tracks: dict[str, dict[int, float]]) -> Path:
         + "</property></object></property>"
         for name, rows in tracks.items()
     )
+    path.parent.mkdir(exist_ok=True)
     path.write_text(
         f'<?xml version="1.0" encoding="UTF-8"?>\n<object class="{P}cabrillo.tracker.TrackerPanel">'
         f'<property name="coords" type="object"><object class="{P}media.core.ImageCoordSystem">'
@@ -130,6 +131,17 @@ def test_a_campaign_may_name_such_a_file_as_its_track(
     with pytest.raises(SystemExit) as left:
         main(["check", str(campaign), "--quiet"])
     assert left.value.code == 0
+
+
+def test_the_track_command_reads_a_project(tmp_path: Path, rows: dict[int, float]) -> None:
+    path = write_project(tmp_path / "in" / "d05.trk", {"mass A": rows})
+    arguments = ["track", str(path), "--fps", "10000", "--pixel-um", "20", "--surface-row", "302", "--quiet"]
+    with pytest.raises(SystemExit) as left:
+        main([*arguments, "--out", str(tmp_path / "out")])
+    assert left.value.code == 0
+    written = pd.read_csv(tmp_path / "out" / "track.csv")
+    assert np.allclose(written["tip_row_px"], list(rows.values()), atol=1e-6)
+    assert (tmp_path / "out" / "curve.csv").is_file()
 
 
 def test_errors_of_trackpy_are_taken(tmp_path: Path, rows: dict[int, float]) -> None:
