@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import platform
@@ -140,6 +141,14 @@ def _open_dask(address: str) -> Iterator[tuple[Executor, int]]:
         raise InferenceError(
             "", "--scheduler", "needs dask.distributed; install it with pip install distributed"
         ) from None
+    for name in (
+        "distributed",
+        "distributed.client",
+        "distributed.core",
+        "distributed.comm",
+        "tornado.application",
+    ):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # labsim says what happened, in one line
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as trouble:
