@@ -54,6 +54,7 @@ SCAN_MARGIN = 1.06
 SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
 ITERATIONS = 12
 SETTLED = 0.02  # of a standard deviation
+BEYOND = 0.1  # of ln p_m, how far outside its range an estimate may stray
 
 
 @dataclass(frozen=True)
@@ -253,7 +254,7 @@ def open_workbench(
     model: Model | None = None,
 ) -> Workbench:
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
-    drops = drops if drops is not None else observe_drops(campaign)
+    drops = drops if drops is not None else observe_drops(campaign)[0]
     if not drops:
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
@@ -394,7 +395,7 @@ def fit_hypothesis(
             linear.blocks, names, _priors(bench, values)
         )
         moved = _limit(bench, hypothesis, step, values)
-        new_log = float(np.clip(log_p_m + np.clip(moved[0], -0.7, 0.7), low - 0.7, high + 0.7))
+        new_log = float(np.clip(log_p_m + np.clip(moved[0], -0.7, 0.7), low - BEYOND, high + BEYOND))
         change = [abs(new_log - log_p_m) / math.sqrt(covariance[0, 0])]
         log_p_m = new_log
         for k, name in enumerate(hypothesis):

@@ -39,6 +39,7 @@ class Terms:
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.004  # of the depth, smooth
+    numerical_slope: float = 0.01  # of the depth, per e-fold of depth over tip radius, common to all drops
     heights: bool = True
 
 
@@ -184,6 +185,11 @@ def linearise(
             shared.setdefault(f"{kind} {key}", []).append((sections[name], column))
         offset_column = np.concatenate([np.full(here.size, terms.contact_offset * model.radius), pad])
         shared.setdefault("contact offset", []).append((sections[name], offset_column))
+        shallow = np.maximum(here, 0.0)  # depths that few spacings resolve are the least converged
+        slope = shallow * np.log(np.maximum(shallow, 0.02 * model.radius) / model.radius)
+        shared.setdefault("numerical slope", []).append(
+            (sections[name], np.concatenate([slope * terms.numerical_slope, pad]))
+        )
         final = float(np.exp(code[0]))
         stop = float(np.exp(code[1]))
         clock = model.matrix @ (observed.time / instrument.rate_factor - instant.contact_time)

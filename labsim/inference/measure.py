@@ -22,11 +22,12 @@ class Measurements:
 
 
 def measure(campaign: Campaign) -> Measurements:
-    """Read tracks, track videos, reduce scans. A scan that cannot be reduced is left out with a warning.
+    """Read tracks, track videos, reduce scans. A drop or scan that shows nothing is left out with a warning.
 
-    Raises MeasurementError for a drop that shows nothing.
+    Raises MeasurementError where no drop is left.
     """
-    seen = Measurements(observe_drops(campaign))
+    drops, warnings = observe_drops(campaign)
+    seen = Measurements(drops, warnings=warnings)
     for scan in campaign.scans:
         try:
             reduced = reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor)

@@ -136,10 +136,21 @@ def read_observed_track(drop: Drop) -> Track:
     return track_projectile(open_frames(drop.record.path), frame_rate=drop.camera.frame_rate)
 
 
-def observe_drops(campaign: Campaign) -> list[ObservedDrop]:
+def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
+    """Every drop that shows something, and one line for each that does not.
+
+    Raises MeasurementError where none does: the first one's.
+    """
     places = sequence_fractions(campaign.drops)
-    return [
-        observe_drop(drop, read_observed_track(drop), places[drop.name])
-        for drop in campaign.drops
-        if drop.record.kind != "summary"
-    ]
+    seen: list[ObservedDrop] = []
+    failures: list[tuple[str, MeasurementError]] = []
+    for drop in campaign.drops:
+        if drop.record.kind == "summary":
+            continue
+        try:
+            seen.append(observe_drop(drop, read_observed_track(drop), places[drop.name]))
+        except MeasurementError as error:
+            failures.append((drop.name, error))
+    if failures and not seen:
+        raise failures[0][1]
+    return seen, [f"drop {name} left out: {error}" for name, error in failures]

@@ -23,6 +23,17 @@ class Outline:
     tip_width: float
 
 
+@dataclass(frozen=True)
+class Body:
+    """One dark body in a frame (px): centre of its box, its size and area."""
+
+    y: float
+    x: float
+    height: float
+    width: float
+    area: float
+
+
 class Outliner:
     """Finds outlines in the frames of one scene; only the columns near the projectile's path are looked at."""
 
@@ -92,6 +103,26 @@ class Outliner:
             width=float(np.median(widths[solid])),
             tip_width=float(lower.max()) if lower.size else typical,
         )
+
+    def find_bodies(self, picture: np.ndarray, brightness: float, share: float = 0.3) -> list[Body]:
+        """All bodies near the path that cover at least ``share`` of the light, 30 px or more."""
+        crop = cv2.blur(picture[:, self.left : self.right], (3, 3)).astype(np.float32) / np.float32(
+            brightness
+        )
+        away = self.background - crop
+        covered = ((away if self.dark else -away) > 2 * share * self.half) & self.useful
+        count, _, stats, middles = cv2.connectedComponentsWithStats(covered.astype(np.uint8), connectivity=4)
+        return [
+            Body(
+                float(middles[k][1]),
+                float(middles[k][0]) + self.left,
+                float(stats[k][cv2.CC_STAT_HEIGHT]),
+                float(stats[k][cv2.CC_STAT_WIDTH]),
+                float(stats[k][cv2.CC_STAT_AREA]),
+            )
+            for k in range(1, count)
+            if stats[k][cv2.CC_STAT_AREA] >= 30
+        ]
 
 
 def choose_spread(positions: FloatArray, candidates: np.ndarray, count: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from .frames import Frames
 LEAST_CONTRAST = 4.0  # times the noise; below, every method fails (Cheezum et al. 2001)
 SPARSE = 4096  # pixels that stand for the picture where brightness and noise are followed in time
 NOISE_FRAMES = 600
+ROUGHEST_SURFACE = 3.0  # px rms about a straight line; beyond, it is a carpet or a picture, not raked dust
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,8 @@ def _find_surface(
         misfit = y - slope * x - offset
         keep = np.abs(misfit - np.median(misfit)) < 3.5 * max(1.4826 * np.median(np.abs(misfit)), 0.05)
     roughness = float(np.std(misfit[keep]))
+    if roughness > ROUGHEST_SURFACE:
+        return None, 0.0
     # neighbouring columns share the lumps of the surface: about one independent value per ten columns
     sigma = max(roughness / np.sqrt(max(keep.sum() / 10.0, 1.0)), 0.02)
     return (float(offset), float(slope)), sigma

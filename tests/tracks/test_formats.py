@@ -107,7 +107,7 @@ def test_a_campaign_may_name_such_a_file_as_its_track(
     kind: str, campaign: Path, rows: dict[int, float]
 ) -> None:
     """The same drop in five formats is the same observation as its track.csv."""
-    expected = observe_drops(read_campaign(campaign))[0]
+    expected = observe_drops(read_campaign(campaign))[0][0]
     camera = read_campaign(campaign).drops[0].camera
     assert camera is not None
     if kind == "trk":
@@ -124,7 +124,7 @@ def test_a_campaign_may_name_such_a_file_as_its_track(
         write_heights(put(campaign, "d05.txt"), rows, camera)
     else:
         write_trackpy(put(campaign, "d05.csv"), rows)
-    found = observe_drops(read_campaign(campaign))[0]
+    found = observe_drops(read_campaign(campaign))[0][0]
     assert np.allclose(found.time, expected.time, rtol=0, atol=1e-12)
     assert np.allclose(found.depth, expected.depth, rtol=0, atol=1e-9)
     assert found.contact_time == pytest.approx(expected.contact_time, abs=1e-7)
