@@ -15,7 +15,7 @@ from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..records import Campaign
-from .explore import explore
+from .explore import explore, is_unexplained
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Score, Screening, screen, screen_pairs
@@ -24,7 +24,7 @@ from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
-MOST_RERUN = 5  # effects that cost runs
+MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -97,8 +97,11 @@ def judge_campaign(
     lay_out_shapes(bench)
     screening = screen(bench, nominal, np.random.default_rng(seed))
     unknown = fit_unknown(bench, nominal)
-    explored = explore(bench, nominal, screening)
-    fits = confirm_singles(bench, nominal, screening, explored)
+    fits = confirm_singles(bench, nominal, screening)
+    explored: dict[str, Fit] = {}
+    if is_unexplained(bench, nominal, fits, screening):
+        explored = explore(bench, nominal, screening)
+        fits = confirm_explored(bench, nominal, fits, explored)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
     verdict = judge(
@@ -175,36 +178,35 @@ def diagnose_campaign(
     )
 
 
-def confirm_singles(
-    bench: Workbench, nominal: Fit, screening: Screening, explored: dict[str, Fit]
-) -> list[Fit]:
-    """Re-simulate the effects that screening and exploring cannot exclude; those of the measurement cost nothing and are all
-    fitted."""
+def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> list[Fit]:
+    """Re-simulate the effects that the screening cannot exclude; those of the measurement cost nothing and are all fitted."""
     if not screening.scores:
         return []
-    promise = {score.name: score.log_bayes for score in screening.scores}
-    for name, fit in explored.items():
-        promise[name] = fit.evidence - nominal.evidence
-    ranked = sorted(screening.scores, key=lambda score: -promise[score.name])
-    free = [score for score in ranked if not bench.costs_runs(score.name)]
+    free = [score for score in screening.scores if not bench.costs_runs(score.name)]
     fits = [_fit_from_score(bench, nominal, score) for score in free]
-    top = max([promise[ranked[0].name], *(fit.evidence - nominal.evidence for fit in fits)])
+    top = max([screening.scores[0].log_bayes, *(fit.evidence - nominal.evidence for fit in fits)])
     costly = [
         score
-        for score in ranked
+        for score in screening.scores
         if bench.costs_runs(score.name)
-        and promise[score.name] > max(top - CLOSE, WORTHWHILE)
+        and score.log_bayes > max(top - CLOSE, WORTHWHILE)
         # finer runs for a suspicion of coarseness only where nothing else explains as much
-        and (bench.effects[score.name].kind != "numerics" or score is ranked[0])
+        and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
-    for score in costly:
-        start = explored.get(score.name)
-        if start is None:
-            fits.append(_fit_from_score(bench, nominal, score))
-        else:
-            begin = (start.log_p_m, start.values)
-            fits.append(fit_hypothesis(bench, (score.name,), begin, nuisances=start))
-    return fits
+    return fits + [_fit_from_score(bench, nominal, score) for score in costly]
+
+
+def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: dict[str, Fit]) -> list[Fit]:
+    """The fits with those joined, or replaced, that start from the best of exploring."""
+    known = {fit.hypothesis[0]: fit for fit in fits}
+    top = max([nominal.evidence, *(fit.evidence for fit in [*fits, *explored.values()])])
+    ranked = sorted(explored, key=lambda name: -explored[name].evidence)
+    for name in [name for name in ranked if explored[name].evidence > top - CLOSE][:MOST_RERUN]:
+        start = explored[name]
+        fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
+        if name not in known or fit.evidence > known[name].evidence:
+            known[name] = fit
+    return list(known.values())
 
 
 def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:

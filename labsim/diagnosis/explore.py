@@ -8,6 +8,7 @@ best of the three replaces the tangent's word.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import chi2
@@ -17,22 +18,31 @@ from ..inference.likelihood import solve_globals
 from .screen import Screening
 
 REACH = 2.5  # factor on p_m
+KINDS = ("material", "contact")  # that p_m can make up for; samples are seen in the scans
 FAILED = 0.05  # p value of the nominal model below which it is worth while
+EXPLAINED = 0.01  # p value of a fit above which nothing more is looked for
 PROMISING = 3.0  # ln Bayes factor of the screening from which it is
 HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed to its end
 FIRST_STEPS = 4
 
 
-def nominal_fails(bench: Workbench, nominal: Fit, screening: Screening) -> bool:
-    freedom = max(nominal.points - 1 - 2 * len(bench.models), 1)
+def goodness(bench: Workbench, fit: Fit) -> float:
+    """p value of χ², contact time and speed of each drop being free."""
+    freedom = max(fit.points - 1 - len(fit.hypothesis) - 2 * len(bench.models), 1)
+    return float(chi2.sf(fit.chi_square, freedom))
+
+
+def is_unexplained(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
+    """Whether the nominal model fails and no effect fitted so far explains the data."""
     best = screening.scores[0].log_bayes if screening.scores else -math.inf
-    return best > PROMISING or chi2.sf(nominal.chi_square, freedom) < FAILED
+    if best <= PROMISING and goodness(bench, nominal) >= FAILED:
+        return False
+    found = max(fits, key=lambda fit: fit.evidence, default=nominal)
+    return found.evidence < nominal.evidence + PROMISING or goodness(bench, found) < EXPLAINED
 
 
 def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, Fit]:
-    """Best coarse fit of every effect that costs runs, by name; empty where the nominal model explains the data."""
-    if not nominal_fails(bench, nominal, screening):
-        return {}
+    """Best coarse fit of every effect that p_m can make up for, by name."""
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     starts = [nominal.log_p_m]
     for shift in (math.log(REACH), -math.log(REACH)):
@@ -42,7 +52,7 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, F
     top = nominal.evidence
     for score in screening.scores:
         name = score.name
-        if not bench.costs_runs(name) or bench.effects[name].kind == "numerics":
+        if not bench.costs_runs(name) or bench.effects[name].kind not in KINDS:
             continue
         for start in starts:
             first = _start_at(bench, nominal, name, start)

@@ -26,7 +26,9 @@ from .forward import ResponseTable
 GREY = 0.005  # relative, of the grey calibration, where nothing is stated
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
 NUMERICAL_DEPTH = 0.01  # of the depth
-NUMERICAL_SHARE = 0.08  # of φ - φ0: two spacings, and the interpolation between runs, differ by that beside the tip
+NUMERICAL_SHARE = (
+    0.08  # of φ - φ0: two spacings, and the interpolation between runs, differ by that beside the tip
+)
 NUMERICAL_FLOOR = 0.0015
 CORRELATION = 0.25  # length of the solver's error, tip radii
 

@@ -69,7 +69,9 @@ class DropSetting:
         area = 2 * radius if planar else math.pi * radius**2
         expected = 7e-4 * self.projectile.mass * self.impact_speed / area
         # softer dust lets it through to where the bottom would be felt
-        expected *= max(1.0, 1300.0 / (self.material.p_m * min(self.material.shear_factor, 1.0))) ** (1 / 3)
+        expected *= max(1.0, 1300.0 / max(self.material.p_m * min(self.material.shear_factor, 1.0), 1.0)) ** (
+            1 / 3
+        )
         width = self.width if self.width is not None else (16 * radius if planar else 6 * radius)
         depth = self.depth if self.depth is not None else max(6 * radius, 3 * radius + 1.5 * expected)
         cells = 2 * round(width / self.spacing / 2) if planar else round(width / self.spacing)
