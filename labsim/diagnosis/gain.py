@@ -38,8 +38,14 @@ class Gain:
 
 
 def predict_held_out(bench: Workbench, fit: Fit) -> HeldOut:
-    """Leave each drop out, fit the globals to the others, predict its motion below the surface."""
+    """Leave each drop out, fit the globals to the others, predict its motion below the surface.
+
+    A single drop leaves nothing to predict it from: its figures are NaN.
+    """
     linear = fit.linear
+    if len(fit.models) < 2:
+        nothing = np.full(1, math.nan)
+        return HeldOut((fit.models[0].observed.name,), nothing, nothing, nothing, np.ones(1))
     names = ["ln_p_m", *fit.hypothesis]
     design = np.stack([linear.tangents[name] for name in names], axis=1)
     precision = np.zeros((len(names), len(names)))
@@ -99,6 +105,8 @@ def measure_gain(nominal: HeldOut, extended: HeldOut) -> Gain:
 
     before, after, noise = pool(nominal.rms), pool(extended.rms), pool(extended.expected)
     difference = extended.log_score - nominal.log_score
+    if math.isnan(before):
+        return Gain(*[math.nan] * 5, fraction_removed=math.nan)
     removable = max(before**2 - noise**2, 1e-30)
     fraction = (
         float(np.clip(1 - max(after**2 - noise**2, 0.0) / removable, 0.0, 1.0)) if before > noise else 0.0

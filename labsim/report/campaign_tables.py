@@ -185,6 +185,8 @@ def say_verdict(found: Diagnosis) -> str:
 
 def say_gain(gain: Gain) -> str:
     """What held-out drops say of the extension, in words."""
+    if math.isnan(gain.rms_nominal):
+        return "a single drop leaves none to hold out"
     if gain.rms_nominal <= gain.rms_noise:
         return "held-out drops, whose own free fall fixes contact and speed, were predicted within the noise without it"
     return f"on held-out drops {100 * gain.fraction_removed:.0f} % of the removable discrepancy is gone"

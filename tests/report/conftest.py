@@ -125,3 +125,8 @@ def browser():
 
 def load(folder: Path, name: str) -> dict:
     return json.loads((folder / name).read_text())
+
+
+@pytest.fixture(scope="session", name="laws")
+def give_laws():
+    return laws
