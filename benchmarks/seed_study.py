@@ -1,0 +1,242 @@
+"""The published drops of Güttler et al. (2009) against the model and every effect of the catalogue: docs/seed-study.md.
+
+    python benchmarks/seed_study.py [--store FOLDER] [--minutes 30] [--only nominal planar ...]
+
+Runs what is missing (the order is that of ``plan``, most wanted first), stops at the time given, writes every run that
+there is to docs/seed-study.csv and prints the tables of the page from that file. Start it again and it goes on.
+``--tables`` only prints. The round drops take four spacings a tip radius, which is coarse: ``--only error`` measures it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from labsim.effects import list_effects, list_places, reference_campaign
+from labsim.inference.planar import planar_setting
+from labsim.inference.runs import FailedRun, RunStore
+from labsim.records import Material, Projectile
+from labsim.sph import DropRun, DropSetting
+
+TABLE = Path(__file__).parents[1] / "docs" / "seed-study.csv"
+GLASS = 2540.0  # kg/m^3, published for the simulated cylinder; the projectiles have a bead's mass (published)
+SMALL, LARGE = 0.5e-3, 1.5e-3  # m, published radii
+BULK_MODULUS = 45.0e3  # Pa, assumed (the paper gives none); scanned
+CELLS = 5  # spacings a tip radius of the round drops
+PLANAR_CELLS = 5.5  # as the shipped campaign
+P_M = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Pa, nominal model
+P_M_PLANAR = (162.5, 325.0, 650.0, 1300.0, 2600.0, 5200.0)
+P_M_EFFECT = (400.0, 1000.0, 150.0)  # Pa, where effects are run
+SPEEDS = (0.0394, 0.07, 0.118, 0.197, 0.345, 0.591, 1.034, 1.77)  # m/s: m v/A 0.2 to 3 for both radii
+MOMENTA = (1.0, 1.75)  # kg/(m s): the drops that effects are judged by
+STOPS = (0.01, 0.02, 0.05, 0.1, 0.15)  # m/s, speeds below which a projectile may be called at rest
+FILLING = (0.17, 0.18, 0.19, 0.20, 0.21, 0.22, 0.23, 0.25, 0.27)  # thresholds of compacted volume
+LEVELS = {  # case -> effect and the values of its parameters that are run besides null
+    "gravity": ("gravity", ({"g": 9.81},)),
+    "shear_strength": ("shear_strength", ({"factor": 0.25}, {"factor": 0.5}, {"factor": 2.0})),
+    "strength_rate": ("strength_rate", ({"eta": 0.05}, {"eta": 0.2}, {"eta": 0.8})),
+    "strength_rate_n1": ("strength_rate", tuple({"eta": eta, "n": 1.0} for eta in (5e-4, 2e-3, 8e-3))),
+    "surface_crust": ("surface_crust", tuple({"excess": e, "length": 0.3e-3} for e in (-0.0255, 0.04, 0.12))),
+    "surface_crust_1mm": (
+        "surface_crust",
+        tuple({"excess": e, "length": 1e-3} for e in (-0.0255, 0.02, 0.06)),
+    ),
+    "density_gradient": ("density_gradient", tuple({"gradient": g} for g in (-2.5, 6.0, 20.0))),
+    "side_friction": ("side_friction", tuple({"force_per_length": f} for f in (0.3, 0.8, 2.0))),
+    "contact_friction": ("contact_friction", ({"mu": 0.2}, {"mu": 0.5}, {"mu": 1.2})),
+    "strength_slope": ("strength_slope", ({"delta": 0.3}, {"delta": 0.45}, {"delta": 0.9})),
+    "pore_gas": ("pore_gas", ({"P0": 1e3}, {"P0": 5e3}, {"P0": 3e4})),
+    "hard_floor": ("hard_floor", ({"depth": 1.6e-3}, {"depth": 2.0e-3}, {"depth": 2.6e-3})),
+    "bulk_modulus": ("bulk_modulus", ({"K0": 6e3}, {"K0": 15e3}, {"K0": 300e3})),
+    "artificial_viscosity": ("artificial_viscosity", ({"alpha": 0.1}, {"alpha": 1.0}, {"alpha": 2.0})),
+    "strength_ceiling": ("strength_ceiling", ({"phi_2": 0.35}, {"phi_2": 0.45}, {"phi_2": 0.72})),
+    "filling_factor": ("filling_factor", ({"phi_0": 0.135}, {"phi_0": 0.16}, {"phi_0": 0.18})),
+    "projectile_mass": ("projectile_mass", ({"factor": 0.75}, {"factor": 1.3}, {"factor": 1.8})),
+    "tensile_strength": ("tensile_strength", ({"factor": 0.2}, {"factor": 3.0}, {"factor": 10.0})),
+}
+
+
+@dataclass(frozen=True)
+class Task:
+    """One run: what it belongs to, the values of an effect as text, and the setting."""
+
+    group: str
+    case: str
+    setting: DropSetting
+
+
+def speed_at(momentum: float, radius: float) -> float:
+    """Speed (m/s) of a bead of this radius (m) at m v/A (kg/(m s))."""
+    return momentum / (4.0 / 3.0 * GLASS * radius)
+
+
+def round_drop(
+    radius: float, speed: float, p_m: float, tip: str = "hemisphere", cells: int = CELLS
+) -> DropSetting:
+    """A round projectile with the mass of a glass bead, into dust without gravity."""
+    return DropSetting(
+        projectile=Projectile(tip=tip, tip_radius=radius, mass=GLASS * 4.0 / 3.0 * math.pi * radius**3),  # type: ignore[arg-type]
+        impact_speed=speed,
+        material=Material(p_m=p_m, bulk_modulus=BULK_MODULUS),
+        gravity=0.0,
+        spacing=radius / cells,
+        duration=80.0 * radius,
+        after_stop=0.0,
+        depth=None,
+    )
+
+
+def planar_drop(
+    radius: float, speed: float, p_m: float, cells: float = PLANAR_CELLS, k0: float = BULK_MODULUS
+) -> DropSetting:
+    """The seed's cylinder in its box of 8 x 5 mm², scaled with the radius."""
+    bead = round_drop(radius, speed, p_m).projectile
+    return planar_setting(bead, speed, Material(p_m=p_m, bulk_modulus=k0), spacing=radius / cells)
+
+
+def plan() -> Iterator[Task]:
+    """All runs, most wanted first."""
+    for p_m in P_M:
+        for speed in SPEEDS:
+            yield Task("nominal", "", round_drop(SMALL, speed, p_m))
+    for p_m in (*P_M, *P_M_EFFECT):
+        yield Task("bead", "", round_drop(SMALL, 0.8, p_m, tip="sphere"))
+    yield Task("scaling", "", round_drop(LARGE, SPEEDS[4], 500.0))
+    yield Task("bulk", "", round_drop(SMALL, 0.8, 500.0))
+    for p_m in P_M_PLANAR:
+        for speed in SPEEDS:
+            yield Task("planar", "", planar_drop(SMALL, speed, p_m))
+    yield from _plan_effects()
+    for k0 in (4.5e3, 300e3):
+        for p_m in P_M_PLANAR[1:5]:
+            for speed in (0.345, 0.65):
+                yield Task("planar_K0", f"{k0:g}", planar_drop(SMALL, speed, p_m, k0=k0))
+    for k0 in (BULK_MODULUS, 300e3):
+        drop = planar_drop(SMALL, 0.65, 1300.0, k0=k0)
+        yield Task("planar_alpha", "1", drop.replace(numerics=replace(drop.numerics, alpha=1.0)))
+    for radius, speed in ((SMALL, 0.591), (LARGE, 0.197)):
+        drop = planar_drop(radius, speed, 1300.0)
+        yield Task("planar_gravity", "9.81", drop.replace(gravity=9.81))
+        yield Task("planar_box", "8 x 5 mm", replace(drop, width=8.0e-3, depth=5.0e-3))
+    for cells in (8, 11):
+        for speed in (0.197, 0.65):
+            yield Task("planar_error", f"{cells}", planar_drop(SMALL, speed, 1300.0, cells=cells))
+    for width in (8.333, 12.0):
+        drop = round_drop(LARGE, SPEEDS[4], 500.0)
+        yield Task("wall", f"{width:g}", drop.replace(width=width * LARGE, depth=8.0 * LARGE))
+    for k0 in (4.5e3, 300e3):
+        for p_m in (250.0, 500.0, 1000.0):
+            drop = round_drop(SMALL, 0.591, p_m)
+            yield Task("K0", f"{k0:g}", drop.replace(material=drop.material.replace(bulk_modulus=k0)))
+    for cells in (8, 12):
+        for speed in (0.197, 0.345, 0.591, 1.034):
+            yield Task("error", f"{cells}", round_drop(SMALL, speed, 500.0, cells=cells))
+
+
+def _plan_effects() -> Iterator[Task]:
+    campaign = replace(reference_campaign(), gravity=0.0)
+    effects, place = list_effects(campaign), list_places(campaign)["D01"]
+    beside = replace(place, is_scan=True, tip="sphere")
+    for p_m in P_M_EFFECT:  # a study that is cut short has every effect at the first p_m
+        for number in range(3):
+            for case, (name, levels) in LEVELS.items():
+                if number >= len(levels):
+                    continue
+                values = levels[(number + 1) % len(levels)]  # the moderate level first
+                label = f"{next(iter(values.values())):g}"
+                for radius in (SMALL, LARGE):
+                    for momentum in MOMENTA:
+                        drop = round_drop(radius, round(speed_at(momentum, radius), 3), p_m)
+                        yield Task(case, label, effects[name].apply(drop, values, place))
+                bead = round_drop(SMALL, 0.8, p_m, tip="sphere")
+                yield Task(case, label, effects[name].apply(bead, values, beside))
+
+
+COLUMNS = ("group", "case", "geometry", "tip", "radius_mm", "speed_m_s", "p_m_Pa", "K0_Pa", "cells", "depth_mm",
+           "stopping_time_ms", *(f"time_below_{stop:g}_ms" for stop in STOPS), "sine_time_ms", "viscous_share",
+           *(f"volume_above_{phi:g}" for phi in FILLING))  # fmt: skip
+
+
+def describe(task: Task, run: DropRun) -> dict[str, str]:
+    """A row of the table. Volumes in volumes (planar: cross-sections) of the sphere."""
+    setting, radius = run.setting, run.setting.projectile.tip_radius
+    unit = math.pi * radius**2 if setting.geometry == "planar" else 4.0 / 3.0 * math.pi * radius**3
+    row: dict[str, object] = {
+        "group": task.group, "case": task.case, "geometry": setting.geometry, "tip": setting.projectile.tip,
+        "radius_mm": radius * 1e3, "speed_m_s": setting.impact_speed, "p_m_Pa": setting.material.p_m,
+        "K0_Pa": setting.material.bulk_modulus, "cells": radius / setting.spacing,
+        "depth_mm": run.penetration_depth * 1e3, "stopping_time_ms": run.stopping_time * 1e3,
+        "sine_time_ms": sine_time(run) * 1e3, "viscous_share": run.viscous_share,
+    }  # fmt: skip
+    for stop in STOPS:
+        below = np.nonzero(run.velocity <= stop)[0]
+        row[f"time_below_{stop:g}_ms"] = _crossing(run, int(below[0]), stop) * 1e3 if below.size else math.nan
+    for phi in FILLING:
+        row[f"volume_above_{phi:g}"] = run.compacted_volume(phi) / unit
+    return {key: f"{value:.5g}" if isinstance(value, float) else str(value) for key, value in row.items()}
+
+
+def _crossing(run: DropRun, index: int, stop: float) -> float:
+    if index == 0:
+        return 0.0
+    v0, v1 = run.velocity[index - 1], run.velocity[index]
+    return float(run.time[index - 1] + (v0 - stop) / (v0 - v1) * (run.time[index] - run.time[index - 1]))
+
+
+def sine_time(run: DropRun) -> float:
+    """T (s) of the quarter sine z = D sin(π t / 2T) that is nearest to the curve until the stop."""
+    keep = run.time <= run.stopping_time
+    t, z = run.time[keep], run.depth[keep]
+    best, chosen = math.inf, math.nan
+    for trial in run.stopping_time * np.linspace(0.6, 1.6, 201):
+        shape = np.sin(0.5 * math.pi * np.minimum(t / trial, 1.0))
+        misfit = float(np.sum((z - shape * (shape @ z) / (shape @ shape)) ** 2))
+        if misfit < best:
+            best, chosen = misfit, float(trial)
+    return chosen
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--store", type=Path, default=None)
+    parser.add_argument("--minutes", type=float, default=30.0, help="no run is begun after this time")
+    parser.add_argument("--only", nargs="*", help="groups to run; default all")
+    parser.add_argument("--tables", action="store_true", help="print the tables only")
+    options = parser.parse_args()
+    if not options.tables:
+        run_plan(RunStore(options.store), options.minutes, options.only)
+    import seed_tables  # beside this file; it reads this one
+
+    print(seed_tables.report(TABLE))
+
+
+def run_plan(store: RunStore, minutes: float, only: list[str] | None = None) -> None:
+    """Make what is missing, then write all that is there."""
+    began, rows, failed = time.monotonic(), [], 0
+    for task in plan():
+        run = store.find(task.setting)
+        wanted = not only or task.group in only
+        if run is None and wanted and time.monotonic() - began < 60 * minutes:
+            run = store.get_many([task.setting], workers=1)[0]
+            print(f"{time.monotonic() - began:6.0f} s  {task.group} {task.case}", flush=True)
+        if isinstance(run, FailedRun) or (run is not None and not run.stopped):
+            failed += 1
+            print(f"did not stop: {task.group} {task.case} p_m {task.setting.material.p_m:g}", flush=True)
+        elif run is not None:
+            rows.append(describe(task, run))
+    with TABLE.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"{len(rows)} of {sum(1 for _ in plan())} runs in {TABLE.name}, {failed} without a stop")
+
+
+if __name__ == "__main__":
+    main()
