@@ -17,6 +17,7 @@ from .registration import MARGIN, Template, register, sample_opacity
 from .scene import Scene
 
 PASSES = 4
+CLIPPED_BELOW = 0.08  # opacity that a saturated pixel may have by noise and interpolation
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,15 @@ def _fill_nearest(values: FloatArray, known: np.ndarray) -> FloatArray:
     return values[tuple(index)]
 
 
-def find_tip_point(template: Template, lower: bool = True) -> tuple[float, float, float, float, float] | None:
+def find_tip_point(
+    template: Template, lower: bool = True, clipped: bool = False
+) -> tuple[float, float, float, float, float] | None:
     """Circle through the round end of a template: centre row and column from the origin, radius, blur, misfit (rms).
 
     The opacity across a blurred edge is an error function of the distance from the circle; an edge that curves with
     radius R looks p²/(2R) too small when it is blurred by p, which is put right. Pixels within 60° of the end count.
-    None where the end is not round.
+    Under a saturated background (``clipped``) only what is darker counts, and how bright the background would have been
+    is fitted with the rest. None where the end is not round.
     """
     m = template.opacity if lower else template.opacity[::-1]
     h, w = m.shape
@@ -117,12 +121,17 @@ def find_tip_point(template: Template, lower: bool = True) -> tuple[float, float
         distance = np.hypot(yy - q[0], xx - q[1])
         angle = np.abs(np.arctan2(xx - q[1], yy - q[0]))
         near = (angle < np.pi / 3) & (np.abs(distance - q[2]) < 7.0)
+        if clipped:
+            near &= m > CLIPPED_BELOW
         if near.sum() < 40:
             return None
         found = least_squares(
             residual,
             q,
-            bounds=([-np.inf, -np.inf, 2.0, 0.2, -0.5, 0.5], [np.inf, np.inf, 10 * w, 8.0, 0.5, 1.5]),
+            bounds=(
+                [-np.inf, -np.inf, 2.0, 0.2, -2.0 if clipped else -0.5, 0.5],
+                [np.inf, np.inf, 10 * w, 8.0, 0.5, 1.5],
+            ),
             x_scale=[1, 1, 1, 0.3, 0.1, 0.1],
             loss="soft_l1",  # a reflection that crosses the edge must not pull the circle
             f_scale=0.05,

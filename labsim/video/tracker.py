@@ -16,6 +16,7 @@ from .bead import follow_bead, is_bead, needs_disc
 from .direction import check_direction, straighten
 from .following import Progress
 from .frames import Frames
+from .gaps import find_gaps
 from .joining import raise_to_scatter
 from .outline import Outline, Outliner
 from .rod import Positions, follow_rod
@@ -75,9 +76,11 @@ def follow_projectile(
     usable = _usable_pixels(scene)
     warnings = list(frames.warnings)
     full = scene.background >= 0.99 * scene.ceiling
-    if np.mean(full[usable]) > 0.02:
+    clipped = bool(np.mean(full[usable]) > 0.02)
+    if clipped:
         warnings.append(
-            "the background is saturated: edges look shifted and error bars are too small; use less light"
+            "the background is saturated: how bright it would be is guessed from the edges, which may shift the rows "
+            "by some hundredths of a pixel together; use less light"
         )
 
     found = None
@@ -85,7 +88,7 @@ def follow_projectile(
         found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
     if found is None:
         check_direction(frames, outlines)
-        found = follow_rod(frames, scene, usable, outlines, warnings, progress)
+        found = follow_rod(frames, scene, usable, outlines, warnings, progress, clipped=clipped)
     row, sigma, x = found.row, found.sigma, found.x
     reason = [
         ("repeats the frame before" if d else r) for r, d in zip(found.reason, scene.duplicate, strict=True)
@@ -109,10 +112,12 @@ def follow_projectile(
     if rejected:
         kinds = {r: reason.count(r) for r in reason if r}
         warnings.append("frames without a position: " + ", ".join(f"{n} {kind}" for kind, n in kinds.items()))
-    time = time_frames(frames, count, frame_rate)
+    number = frames.numbers[:count].astype(np.int64)
+    if frames.stamps is None and np.all(np.diff(number) == 1):
+        number = _mend_clock(number, np.where(valid, row, np.nan), sigma, scene.duplicate, warnings)
     track = Track(
-        frame=frames.numbers[:count].astype(np.int64),
-        time=time,
+        frame=number,
+        time=time_frames(frames, number, frame_rate),
         tip_row=np.where(valid, row, np.nan),
         sigma=np.where(valid, sigma, np.nan),
         valid=valid,
@@ -163,14 +168,30 @@ def _follow_bare_bead(
     )
 
 
-def time_frames(frames: Frames, count: int, frame_rate: float | None) -> FloatArray:
+def _mend_clock(
+    number: np.ndarray, row: FloatArray, sigma: FloatArray, repeated: np.ndarray, warnings: list[str]
+) -> np.ndarray:
+    """Frame numbers with the gaps that the motion shows, each of them said."""
+    mended = number.copy()
+    for index, missing in find_gaps(number, row, sigma, repeated):
+        mended[index:] += missing
+        what = "a picture was put in twice"
+        if missing > 0:
+            what = "1 frame is missing" if missing == 1 else f"{missing} frames are missing"
+        warnings.append(
+            f"{what} before picture {index} (the projectile's own step says so): later times were moved by {missing:+d}"
+        )
+    return mended
+
+
+def time_frames(frames: Frames, number: np.ndarray, frame_rate: float | None) -> FloatArray:
     """Time of each frame (s): the camera's stamps where there are any, else frame number / rate, both at mid exposure."""
     if frames.stamps is not None:
-        return frames.stamps[:count] + 0.5 * frames.exposure
+        return frames.stamps[: len(number)] + 0.5 * frames.exposure
     rate = frame_rate if frame_rate is not None else frames.header_rate
     if rate is None or not rate > 0:
         raise MeasurementError(frames.path, "--fps", "the file does not say its frame rate; give --fps")
-    return frames.numbers[:count] / rate + 0.5 * frames.exposure
+    return number / rate + 0.5 * frames.exposure
 
 
 def _usable_pixels(scene: Scene) -> np.ndarray:

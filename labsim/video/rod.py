@@ -1,0 +1,125 @@
+"""A rod: its tip while it is free, its top end while it is in view, and the rigid length between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import MeasurementError
+from ..records import FloatArray, Measured
+from .ends import find_edge, find_tip_point, measure_shaft
+from .following import Progress, follow_end, follow_entering
+from .frames import Frames
+from .joining import clip_gap, compare_with_edge, join_ends, raise_to_scatter
+from .outline import Outline
+from .registration import MARGIN
+from .scene import Scene
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Where the projectile is in every frame, (n,) each (px, NaN where unknown), and what was learnt about its shape.
+
+    row, x : of the tip; top_row : of the top end; reason : why there is no row; edge_difference : rms between the
+    registration and the erf edge.
+    """
+
+    row: FloatArray
+    sigma: FloatArray
+    x: FloatArray
+    top_row: FloatArray
+    reason: list[str]
+    length: Measured | None
+    diameter: Measured | None
+    tip_radius: float | None
+    tilt: float | None
+    edge_difference: float | None
+
+
+def follow_rod(
+    frames: Frames,
+    scene: Scene,
+    usable: np.ndarray,
+    outlines: tuple[list[Outline | None], float, float],
+    warnings: list[str],
+    progress: Progress | None,
+    *,
+    clipped: bool = False,
+) -> Positions:
+    """Follow both ends and join them; ``clipped``: the background is saturated.
+
+    Raises MeasurementError where the tip is never seen free.
+    """
+    count = len(scene.brightness)
+    top = follow_end(frames, scene, usable, outlines, "top", progress)
+    tip = follow_end(frames, scene, usable, outlines, "tip", progress)
+    if tip is None:
+        raise MeasurementError(
+            frames.path,
+            "video",
+            "the tip is never seen free of the dust and the picture's edge; frame it wider",
+        )
+    round_end = find_tip_point(tip.template, clipped=clipped)
+    if round_end is None:
+        rows = np.flatnonzero((tip.template.opacity > 0.5).sum(axis=1) > 0.3 * outlines[1])
+        warnings.append("the tip is not round: its lowest half-dark row is taken")
+        tip_offset, tip_radius = float(rows[-1]) + 0.5 + tip.template.top, None
+    else:
+        tip_offset, tip_radius = round_end[0] + round_end[2], round_end[2]
+    first_sigma = tip.sigma
+    tip = replace(tip, sigma=raise_to_scatter(tip.y, tip.sigma, "the tip", warnings))
+    tip_y, tip_x = tip.y + tip_offset, tip.x
+    tip_sigma = tip.sigma.copy()
+    row, sigma, x = tip_y.copy(), tip_sigma.copy(), tip_x.copy()
+    reason = list(tip.reason)
+    top_row = np.full(count, np.nan)
+    length = edge_rms = tilt = diameter = None
+    if top is not None:
+        top = replace(top, sigma=raise_to_scatter(top.y, top.sigma, "the top end", warnings))
+        shaft = measure_shaft(top.template)
+        if shaft is not None:
+            tilt, diameter = shaft[0], Measured(shaft[1], shaft[2])
+        edge = find_edge(top.template)
+        end = find_tip_point(top.template, lower=False) if edge is None else None
+        offset = edge[0] if edge is not None else (end[0] - end[2] if end is not None else 0.0)
+        top_row = top.y + offset
+        both = np.isfinite(top.y) & np.isfinite(tip_y) & (tip_sigma < 0.3)
+        if both.sum() >= 1:
+            gap = tip_y[both] - top.y[both]
+            variance = tip_sigma[both] ** 2 + top.sigma[both] ** 2
+            gap, variance = clip_gap(gap, variance)
+            reach = float(np.sum(gap / variance) / np.sum(1 / variance))
+            doubt = float(np.sqrt(1 / np.sum(1 / variance)))
+            scatter = float(np.std(gap)) if len(gap) > 2 else 0.0
+            length = Measured(reach - offset, doubt)
+            if scatter > max(0.03, 3 * float(np.sqrt(np.median(variance)))):
+                warnings.append(
+                    f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane?"
+                )
+            side = float(np.median((tip_x - top.x)[both]))
+            entering = follow_entering(frames, scene, usable, tip, top, reach - tip_offset, side)
+            tip_y = np.where(np.isfinite(entering.y), entering.y + tip_offset, tip_y)
+            tip_x = np.where(np.isfinite(entering.y), entering.x, tip_x)
+            ratio = float(np.nanmedian(tip.sigma / first_sigma))
+            own = raise_to_scatter(entering.y, entering.sigma * ratio, "the half-buried tip", warnings)
+            tip_sigma = np.where(np.isfinite(entering.y), own, tip_sigma)
+            lowest = top.template.top + top.template.opacity.shape[0] - MARGIN
+            shared = reach - tip_offset + tip.template.top + MARGIN < lowest
+            row, sigma, x, reason = join_ends(
+                top, tip_y, tip_x, tip_sigma, tip.reason, reach, side, doubt, shared
+            )
+        else:
+            warnings.append(
+                "tip and top end are never seen together: frames with a buried tip have no position"
+            )
+            reason = [
+                r or ("" if np.isfinite(v) else "tip in the dust") for r, v in zip(reason, row, strict=True)
+            ]
+        if edge is not None:
+            edge_rms = compare_with_edge(
+                frames, scene, usable, top, edge, row, sigma, reason, warnings, progress
+            )
+    else:
+        warnings.append("the top end is never in view: only frames with a free tip have a position")
+    return Positions(row, sigma, x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)
