@@ -17,7 +17,7 @@ from .registration import MARGIN, Template, register, sample_opacity
 from .scene import Scene
 
 PASSES = 4
-CLIPPED_BELOW = 0.08  # opacity that a saturated pixel may have by noise and interpolation
+CLIPPED_BELOW = 0.25  # opacity; darker pixels hold no mean over samples of which some were clipped
 
 
 @dataclass(frozen=True)
