@@ -21,10 +21,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import beta, chi2
+from scipy.stats import beta
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
+from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
@@ -41,7 +42,9 @@ def open_campaign(drops: str) -> Campaign:
     projectile = chosen[0].projectile
     bead = Projectile("sphere", projectile.tip_radius, projectile.mass)
     grey = GreyCalibration(12.0, 0.16, campaign.sample.monomer_density)
-    scan = Scan("C01", bead, Measured(0.8, 0.04), Path(), VOXEL, "top", 8, grey)  # only its undisturbed dust is made
+    scan = Scan(
+        "C01", bead, Measured(0.8, 0.04), Path(), VOXEL, "top", 8, grey
+    )  # only its undisturbed dust is made
     return replace(campaign, drops=tuple(chosen), scans=(scan, replace(scan, name="C02")))
 
 
@@ -59,7 +62,6 @@ def judge_hidden(job: tuple[Campaign, Path | None, TruthTable, Hidden, int, floa
             (other, round(float(found.screening.cosines[k, j]), 3)) for j, other in enumerate(names) if j != k
         ]
     sigma = math.sqrt(found.best.covariance[0, 0])
-    freedom = max(found.nominal.points - 1 - 2 * len(found.bench.models), 1)
     value = next(iter(hidden.values.values()), math.nan)
     first = found.verdict.probabilities[0]
     return {
@@ -79,7 +81,7 @@ def judge_hidden(job: tuple[Campaign, Path | None, TruthTable, Hidden, int, floa
         "probability": first[1],
         "ranked": [(" + ".join(h), p) for h, p in found.verdict.probabilities],
         "alike": alike,
-        "goodness": float(chi2.sf(found.nominal.chi_square, freedom)),
+        "goodness": goodness_of_fit(found.nominal),
         "p_value": found.p_value,
         "wall": time.perf_counter() - began,
     }

@@ -7,10 +7,9 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
-from ..inference.fitting import Fit, Hypothesis, Workbench, fit_hypothesis
+from ..inference.fitting import Fit, Hypothesis, Workbench, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
@@ -99,7 +98,7 @@ def judge_campaign(
     unknown = fit_unknown(bench, nominal)
     fits = confirm_singles(bench, nominal, screening)
     explored: dict[str, Fit] = {}
-    if is_unexplained(bench, nominal, fits, screening):
+    if is_unexplained(nominal, fits, screening):
         explored = explore(bench, nominal, screening)
         fits = confirm_explored(bench, nominal, fits, explored)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
@@ -116,9 +115,7 @@ def judge_campaign(
         best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
-    freedom = max(nominal.points - 1 - 2 * len(bench.models), 1)
-    omnibus = float(chi2.sf(nominal.chi_square, freedom))
-    p_value = min(1.0, 2.0 * min(screening.p_value, omnibus))
+    p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
     return Judgement(bench, nominal, rivals, screening, unknown, verdict, p_value, best)
 
 

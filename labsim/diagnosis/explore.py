@@ -11,9 +11,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
 
-from ..inference.fitting import Fit, Workbench, fit_hypothesis, with_probes
+from ..inference.fitting import Fit, Workbench, fit_hypothesis, goodness_of_fit, with_probes
 from ..inference.likelihood import solve_globals
 from .screen import Screening
 
@@ -26,19 +25,13 @@ HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed 
 FIRST_STEPS = 4
 
 
-def goodness(bench: Workbench, fit: Fit) -> float:
-    """p value of χ², contact time and speed of each drop being free."""
-    freedom = max(fit.points - 1 - len(fit.hypothesis) - 2 * len(bench.models), 1)
-    return float(chi2.sf(fit.chi_square, freedom))
-
-
-def is_unexplained(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
+def is_unexplained(nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
     """Whether the nominal model fails and no effect fitted so far explains the data."""
     best = screening.scores[0].log_bayes if screening.scores else -math.inf
-    if best <= PROMISING and goodness(bench, nominal) >= FAILED:
+    if best <= PROMISING and goodness_of_fit(nominal) >= FAILED:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    return found.evidence < nominal.evidence + PROMISING or goodness(bench, found) < EXPLAINED
+    return found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < EXPLAINED
 
 
 def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, Fit]:

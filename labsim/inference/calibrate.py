@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.stats import chi2
 
 from ..effects import Parameter, list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray
-from .fitting import Fit, Workbench, fit_hypothesis, linearise_at, open_workbench
+from .fitting import Fit, Workbench, fit_hypothesis, goodness_of_fit, linearise_at, open_workbench
 from .likelihood import Terms
 from .measure import Measurements, measure
 from .posterior import Posterior, QuadraticResidual, measure_residual, sample
@@ -118,7 +117,7 @@ def calibrate(
     fit = fit_hypothesis(bench, names, (nominal.log_p_m, {})) if names else nominal
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
-    p_value = float(chi2.sf(fit.chi_square, max(fit.points - 1 - len(names) - _free(bench), 1)))
+    p_value = goodness_of_fit(fit)
     warnings = warn_unused_scans(bench)
     if p_value < 0.05:
         warnings.append(f"the model does not explain the data (p = {p_value:.2g}); labsim diagnose asks why")
@@ -146,11 +145,6 @@ def warn_unused_scans(bench: Workbench) -> list[str]:
             f"of scans {names} only the undisturbed dust and the point spread enter the likelihood, not the compacted zone"
         )
     return lines
-
-
-def _free(bench: Workbench) -> int:
-    """Nuisances without a prior of their own: contact time and speed of each drop."""
-    return 2 * len(bench.models)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import ndtr
+from scipy.stats import chi2
 
 from ..effects import Effect, Instrument, Parameter, Place, list_effects, list_places
 from ..effects.model import Model, apply_effects, check_model, make_instrument
@@ -444,6 +445,19 @@ def _share_inside(parameter: Parameter, amplitude: float, step: float, sigma: fl
     low, high = ((limit - parameter.null - amplitude - step) / sigma for limit in parameter.limits)
     inside = float(ndtr(high) - ndtr(low))
     return 0.5 * (step / sigma) ** 2 + math.log(max(inside, 1e-300))
+
+
+def goodness_of_fit(fit: Fit) -> float:
+    """p value of χ², the smallest of the drops' and of the scans' own, times their number.
+
+    Contact time and speed of each drop are free; parts that are known better than they scatter do not hide one that fails.
+    """
+    worst = []
+    for k, block in enumerate(fit.linear.blocks):
+        white = solve_triangular(np.linalg.cholesky(block.covariance), block.residual, lower=True)
+        free = 1 + len(fit.hypothesis) + 2 * len(fit.models) if k == 0 else 0
+        worst.append(float(chi2.sf(white @ white, max(white.size - free, 1))))
+    return min(1.0, len(worst) * min(worst))
 
 
 def _table_number(bench: Workbench, model: DropModel) -> int:

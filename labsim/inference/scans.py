@@ -26,11 +26,13 @@ from .forward import ResponseTable
 GREY = 0.005  # relative, of the grey calibration, where nothing is stated
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
 NUMERICAL_DEPTH = 0.01  # of the depth
-NUMERICAL_SHARE = (
-    0.08  # of φ - φ0: two spacings, and the interpolation between runs, differ by that beside the tip
-)
+# (share of φ - φ0, length in tip radii) of the solver's error: what two spacings and the interpolation between runs leave
+# beside the tip, and the overshoot of a compaction front, which is alike over the whole zone
+NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
-CORRELATION = 0.25  # length of the solver's error, tip radii
+# of the variance of a map: with 1, maps of an independent simulator's nominal dust ask for another shear strength (4.5 σ)
+INFLATION = 9.0
+CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
 
 
 @dataclass(frozen=True)
@@ -126,10 +128,12 @@ def linearise_scan(
     covariance = np.zeros((n + 1, n + 1))
     covariance[:n, :n] = noise
     cell = float(np.mean(np.diff(found.r)))
-    distance2 = (apart_r**2 + apart_z**2) * (cell / (CORRELATION * observed.radius)) ** 2
+    distance2 = (apart_r**2 + apart_z**2) * (cell / observed.radius) ** 2
     contrast = np.abs(here[:n] - observed.undisturbed)
-    error = NUMERICAL_SHARE * contrast + NUMERICAL_FLOOR
-    covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2)
+    for share, length in NUMERICAL:
+        error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
+        covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2 / length**2)
+    covariance *= INFLATION
     covariance[n, n] = (NUMERICAL_DEPTH * math.exp(model.table.code(log_p_m, log_speed, amplitudes)[0])) ** 2
     speed = observed.scan.speed
     nuisances = [
@@ -138,6 +142,7 @@ def linearise_scan(
         * (speed.sigma / speed.value),
         (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02 * scatter,
         np.append(here[:n] * GREY, 0.0),
+        np.append((here[:n] - observed.undisturbed) * CONTRAST, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
     spread = speed.sigma / speed.value
