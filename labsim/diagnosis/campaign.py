@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
-from ..inference.fitting import Fit, Hypothesis, Workbench, fit_hypothesis, goodness_of_fit
+from ..inference.fitting import Fit, Hypothesis, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
+from ..inference.workbench import Workbench
 from ..records import Campaign
 from .explore import explore, is_unexplained
 from .gain import Gain, HeldOut, measure_gain, predict_held_out

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..inference.fitting import Fit, Workbench, fit_hypothesis, goodness_of_fit, with_probes
+from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit, with_probes
 from ..inference.likelihood import solve_globals
+from ..inference.workbench import Workbench
 from .screen import Screening
 
 REACH = 2.5  # factor on p_m

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ..inference.fitting import Fit, Workbench
+from ..inference.fitting import Fit
+from ..inference.workbench import Workbench
 from ..records import FloatArray
 
 

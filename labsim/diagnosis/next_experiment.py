@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..inference.curves import FRACTIONS
-from ..inference.fitting import Fit, Workbench
+from ..inference.fitting import Fit
+from ..inference.workbench import Workbench
 from ..records import FloatArray
 
 WORTHWHILE = 0.01  # bits below which an experiment is not suggested

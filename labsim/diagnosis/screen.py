@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..inference.fitting import Fit, Workbench, amplitude_nodes, screening_node, with_probes
+from ..inference.fitting import Fit, with_probes
+from ..inference.workbench import Workbench, amplitude_nodes, screening_node
 from ..records import FloatArray
 
 DRAWS = 20_000

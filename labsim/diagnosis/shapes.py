@@ -15,8 +15,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..effects import Effect, Parameter
-from ..inference.fitting import Fit, Workbench, linearise_dust
+from ..inference.fitting import Fit, linearise_dust
 from ..inference.likelihood import solve_globals
+from ..inference.workbench import Workbench
 from .screen import Screening
 
 QUANTILES = (1 / 6, 5 / 6)  # with the stated value, the thirds of the prior

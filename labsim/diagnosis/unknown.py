@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..inference.blocks import Block
-from ..inference.fitting import Fit, Workbench
+from ..inference.fitting import Fit
 from ..inference.likelihood import solve_globals
+from ..inference.workbench import Workbench
 from ..records import FloatArray
 
 SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth

@@ -15,12 +15,13 @@ from ..effects import Parameter, list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray
-from .fitting import Fit, Workbench, fit_hypothesis, goodness_of_fit, linearise_at, open_workbench
+from .fitting import Fit, fit_hypothesis, goodness_of_fit, linearise_at
 from .likelihood import Terms
 from .measure import Measurements, measure
 from .posterior import Posterior, QuadraticResidual, measure_residual, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
+from .workbench import Workbench, open_workbench
 
 
 @dataclass(frozen=True)

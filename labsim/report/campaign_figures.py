@@ -12,8 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
-from ..inference.fitting import Workbench
 from ..inference.posterior import Posterior
+from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .drop_views import DropView
 from .figures import BLUE, GREY, INK, ORANGE, STYLE, new_figure

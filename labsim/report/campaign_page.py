@@ -9,8 +9,8 @@ from typing import Any
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion
 from ..inference.calibrate import Calibration
-from ..inference.fitting import Workbench
 from ..inference.posterior import Posterior
+from ..inference.workbench import Workbench
 from ..records import Campaign
 from .campaign_tables import say_verdict
 from .campaign_words import (

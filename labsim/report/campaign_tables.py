@@ -12,9 +12,9 @@ from ..diagnosis.gain import Gain
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..inference.calibrate import Calibration
-from ..inference.fitting import Workbench
 from ..inference.posterior import Posterior
 from ..inference.summary import summarise
+from ..inference.workbench import Workbench
 from ..sph import solver_hash
 
 NUMERICAL_DEPTH = (

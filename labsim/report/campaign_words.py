@@ -9,8 +9,9 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..effects import Parameter
-from ..inference.fitting import Fit, Workbench
+from ..inference.fitting import Fit
 from ..inference.posterior import Posterior
+from ..inference.workbench import Workbench
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
 from .campaign_tables import say_missing

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.fitting import Fit, Workbench
+from ..inference.fitting import Fit
 from ..inference.forward import predict_depth
 from ..inference.likelihood import DropModel
+from ..inference.workbench import Workbench
 from ..records import FloatArray, Projectile
 
 BEFORE = 0.3  # share of the record after contact that is shown before it

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..ct.reduce import reduce_scan
 from ..errors import MeasurementError
-from ..inference.fitting import Fit, Workbench
+from ..inference.fitting import Fit
+from ..inference.workbench import Workbench
 from ..records import Campaign, FillingMap, FloatArray
 
 

@@ -1,0 +1,357 @@
+"""A measured campaign with its runs: everything a fit needs, and where about an estimate runs are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from ..effects import Effect, Instrument, Place, list_effects, list_places
+from ..effects.model import Model, apply_effects, check_model, make_instrument
+from ..errors import InferenceError
+from ..records import Campaign, FloatArray, Projectile
+from ..sph import DropRun, DropSetting
+from .curves import encode_run
+from .forward import ResponseTable
+from .grid import (
+    COARSE_CELLS,
+    STRENGTH_ANCHOR,
+    STRENGTH_RATIO,
+    Change,
+    Family,
+    Request,
+    RunGrid,
+    few_positions,
+    speed_nodes,
+)
+from .likelihood import (
+    DropModel,
+    Terms,
+    make_drop_model,
+)
+from .observe import ObservedDrop, observe_drops
+from .runs import Progress, RunStore
+from .scans import ObservedScan, ScanModel, encode_scan_run
+from .undisturbed import UndisturbedDust
+
+SCAN_MARGIN = 1.06
+SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
+
+
+@dataclass
+class Workbench:
+    """A measured campaign with its runs: everything a fit needs."""
+
+    campaign: Campaign
+    drops: list[ObservedDrop]
+    grid: RunGrid
+    families: list[Family]
+    places: dict[str, Place]
+    effects: dict[str, Effect]
+    terms: Terms
+    tables: list[ResponseTable]
+    models: list[DropModel]
+    reasons: dict[str, str]  # why an effect does not apply
+    scans: list[ScanModel] = field(default_factory=list)
+    undisturbed: list[UndisturbedDust] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    shape_evidence: dict[str, float] = field(
+        default_factory=dict
+    )  # ln of what fitting a shape beforehand costs
+    renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
+    model: Model | None = None  # what the nominal model is extended by
+
+    def _encode(
+        self, number: int, index: int, variant: str, cells: int | None
+    ) -> list[tuple[ResponseTable, FloatArray | None]]:
+        """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
+        runs = self.grid.stopped_runs(variant, index, cells, number)
+        tables: list[tuple[ResponseTable, Callable[[DropRun], FloatArray]]]
+        if not self.families[number].is_scan:
+            tables = [(self.tables[number], encode_run)]
+        else:
+            tables = [
+                (scan.table, partial(encode_scan_run, observed=scan.observed))
+                for scan in self.scans
+                if self._scan_family(scan) == number
+            ]
+        return [
+            (table, None if runs is None else np.array([encode(run) for run in runs]))
+            for table, encode in tables
+        ]
+
+    def _fill_base(self, number: int, index: int) -> None:
+        for table, codes in self._encode(number, index, "", None):
+            if codes is not None and index not in table.base:
+                table.base[index] = codes
+
+    def _fill_change(self, number: int, index: int, name: str, amplitude: float, cells: int) -> None:
+        before = self._encode(number, index, "", cells)
+        after = self._encode(number, index, self._variant(name, amplitude), cells)
+        for (table, codes), (_, plain) in zip(after, before, strict=True):
+            kept = table.changes if cells >= self.grid.cells else table.fingerprints
+            entry = kept.setdefault(name, {}).setdefault(index, {})
+            if codes is not None and plain is not None and amplitude not in entry:
+                entry[amplitude] = codes - plain
+
+    def _scan_family(self, scan: ScanModel) -> int:
+        p = scan.observed.scan.projectile
+        return find_family(self.families, p, is_scan=True)
+
+    def strength_only(self, name: str) -> bool:
+        """Whether an effect changes nothing of a drop but p_m: then the base runs already hold it."""
+        effect = self.effects[name]
+        if effect.change_setting is None or not effect.amplitudes:
+            return False
+        parameter = effect.amplitudes[0]
+        family = self.families[0]
+        setting = self.grid.setting(family, family.speeds[0], 1000.0)
+        place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
+        changed = effect.apply(setting, {parameter.name: parameter.null + parameter.step}, place)
+        back = changed.replace(material=changed.material.replace(p_m=setting.material.p_m))
+        return back == setting
+
+    def at(self, name: str, amplitude: float) -> dict[str, float]:
+        """Values of an effect's parameters at an amplitude, kept inside the limits."""
+        parameter = self.effects[name].amplitudes[0]
+        low, high = parameter.limits
+        return {parameter.name: float(np.clip(parameter.null + amplitude, low, high))}
+
+    def change(self, name: str, amplitude: float) -> Change:
+        effect, values = self.effects[name], self.at(name, amplitude)
+
+        def apply(setting):  # type: ignore[no-untyped-def]
+            return effect.apply(setting, values, self._place(setting.projectile.tip))
+
+        return apply
+
+    def _place(self, tip: str) -> Place:
+        for place in self.places.values():
+            if place.tip == tip:
+                return place
+        return next(iter(self.places.values()))
+
+    def _variant(self, name: str, amplitude: float) -> str:
+        return f"{self.renamed.get(name, name)} {amplitude:.9g}"
+
+    def require_base(self, indices: Sequence[int]) -> None:
+        self.grid.require([Request("", None, index, None) for index in indices], "nominal model")
+        for number in range(len(self.families)):
+            for index in indices:
+                self._fill_base(number, index)
+
+    def require_changes(
+        self, wanted: Sequence[tuple[str, float, int]], text: str = "effects", *, coarse: bool = False
+    ) -> None:
+        """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
+        cells = min(COARSE_CELLS, self.grid.cells) if coarse else self.grid.cells
+        plain = [Request("", None, index, cells) for index in sorted({index for _, _, index in wanted})]
+        changed = [
+            Request(self._variant(name, a), self.change(name, a), index, cells) for name, a, index in wanted
+        ]
+        self.grid.require(plain + changed, text)
+        for number in range(len(self.families)):
+            for name, amplitude, index in wanted:
+                self._fill_change(number, index, name, amplitude, cells)
+
+    def require_about(self, name: str, log_p_m: float) -> None:
+        """The base about a strength and a fingerprint of one effect there."""
+        self.require_base(enclosing_nodes(log_p_m))
+        index = screening_node(log_p_m)
+        wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self, name, 0.0)]
+        self.require_changes(wanted, f"{name} at another p_m", coarse=True)
+
+    def instruments(self, amplitudes: Mapping[str, float]) -> dict[str, Instrument]:
+        made = {}
+        for name, place in self.places.items():
+            instrument = Instrument()
+            if self.model is not None:
+                instrument = make_instrument(self.model, place, self.effects)
+            for effect_name, amplitude in amplitudes.items():
+                effect = self.effects[effect_name]
+                if effect.change_instrument is not None:
+                    instrument = effect.apply_to_instrument(
+                        instrument, self.at(effect_name, amplitude), place
+                    )
+            made[name] = instrument
+        return made
+
+    def log_offsets(self, amplitudes: Mapping[str, float]) -> dict[str, float]:
+        """Change of ln p_m per drop by effects that act on the strength alone."""
+        offsets = {name: 0.0 for name in self.places}
+        family = self.families[0]
+        setting = self.grid.setting(family, family.speeds[0], 1000.0)
+        changes = [
+            (effect_name, self.at(effect_name, amplitude))
+            for effect_name, amplitude in amplitudes.items()
+            if amplitude != 0.0 and self.strength_only(effect_name)
+        ]
+        changes += (
+            [(n, dict(v)) for n, v in self.model.effects if self.strength_only(n)] if self.model else []
+        )
+        for effect_name, values in changes:
+            for name, place in self.places.items():
+                changed = self.effects[effect_name].apply(setting, values, place)
+                offsets[name] += math.log(changed.material.p_m / setting.material.p_m)
+        return offsets
+
+    def costs_runs(self, name: str) -> bool:
+        return self.effects[name].costs_runs and not self.strength_only(name)
+
+
+def open_workbench(
+    campaign: Campaign,
+    store: RunStore,
+    effects: Mapping[str, Effect],
+    *,
+    terms: Terms | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    cells: int | None = None,
+    drops: list[ObservedDrop] | None = None,
+    scans: Sequence[ObservedScan] = (),
+    undisturbed: Sequence[UndisturbedDust] = (),
+    model: Model | None = None,
+) -> Workbench:
+    """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
+    drops = drops if drops is not None else observe_drops(campaign)[0]
+    if not drops:
+        raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
+    families: list[Family] = []
+    members: dict[tuple, list[ObservedDrop]] = {}
+    for drop in drops:
+        p = drop.drop.projectile
+        members.setdefault((p.tip, p.tip_radius, round(p.mass, 12)), []).append(drop)
+    tables, models = [], []
+    for group in members.values():
+        speeds = [drop.impact_speed for drop in group]
+        slowest, fastest = min(speeds) / SPEED_MARGIN, max(speeds) * SPEED_MARGIN
+        nodes = speed_nodes(slowest, fastest)
+        few = few_positions(nodes, slowest, fastest)
+        projectile = group[0].drop.projectile
+        stated = type(projectile)(projectile.tip, projectile.tip_radius, projectile.mass)
+        families.append(Family(stated, nodes, False, few))
+        table = ResponseTable(np.log(nodes), few)
+        tables.append(table)
+        models += [make_drop_model(drop, table) for drop in group]
+    scan_models = []
+    for (tip, radius, mass), group in _group_scans(scans).items():
+        speeds = [scan.scan.speed.value for scan in group]
+        slowest, fastest = min(speeds) / SCAN_MARGIN, max(speeds) * SCAN_MARGIN
+        nodes = speed_nodes(slowest, fastest)
+        few = few_positions(nodes, slowest, fastest)
+        families.append(Family(Projectile(tip, radius, mass), nodes, True, few))
+        for scan in group:
+            scan_models.append(ScanModel(scan, ResponseTable(np.log(nodes), few)))
+    resolved, reasons = {}, {}
+    for name, effect in effects.items():
+        reason = effect.applies(campaign)
+        if reason:
+            reasons[name] = reason
+        else:
+            resolved[name] = effect.for_campaign(campaign)
+    grid = RunGrid(campaign, store, families, workers=workers, scheduler=scheduler, progress=progress)
+    if cells:
+        grid.cells = cells
+    places = list_places(campaign)
+    bench = Workbench(
+        campaign,
+        drops,
+        grid,
+        families,
+        places,
+        resolved,
+        terms or Terms(),
+        tables,
+        models,
+        reasons,
+        scan_models,
+        list(undisturbed),
+    )
+    if model is not None:
+        extend(bench, model)
+    return bench
+
+
+def extend(bench: Workbench, model: Model) -> None:
+    """Take a model's effects and material into the nominal model; its p_m stays what is looked for.
+
+    Raises EffectError where one of its effects cannot be at work in this campaign.
+    """
+    check_model(model, bench.campaign, list_effects(bench.campaign), bench.campaign.folder)
+    held = [(name, values) for name, values in model.effects if not bench.strength_only(name)]
+
+    def apply(setting: DropSetting) -> DropSetting:
+        setting = setting.replace(material=setting.material.replace(**dict(model.material)))
+        return apply_effects(setting, held, bench._place(setting.projectile.tip), bench.effects)
+
+    bench.model = model
+    bench.grid.extension = apply
+
+
+def _group_scans(scans: Sequence[ObservedScan]) -> dict[tuple, list[ObservedScan]]:
+    groups: dict[tuple, list[ObservedScan]] = {}
+    for scan in scans:
+        p = scan.scan.projectile
+        groups.setdefault((p.tip, p.tip_radius, p.mass), []).append(scan)
+    return groups
+
+
+def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: bool) -> int:
+    """Number of the family with this projectile."""
+    for number, family in enumerate(families):
+        f = family.projectile
+        same = (f.tip, f.tip_radius) == (projectile.tip, projectile.tip_radius)
+        if same and family.is_scan == is_scan and math.isclose(f.mass, projectile.mass, rel_tol=1e-9):
+            return number
+    raise InferenceError("simulation", "projectile", "has no runs")
+
+
+def enclosing_nodes(log_p_m: float) -> list[int]:
+    """The four strength nodes about a value."""
+    below = math.floor((log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
+    return [below - 1, below, below + 1, below + 2]
+
+
+def nearest_nodes(log_p_m: float, share: float = 0.3) -> list[int]:
+    """The nearest strength node, and the next one where the value lies well between two."""
+    place = (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
+    near = round(place)
+    if abs(place - near) <= share:
+        return [near]
+    return [math.floor(place), math.ceil(place)]
+
+
+def screening_node(log_p_m: float) -> int:
+    """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
+    whose nominal p_m an effect has driven off still share their fingerprints' runs."""
+    return 2 * round(0.5 * (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
+
+
+def amplitude_nodes(bench: Workbench, name: str, amplitude: float, *, coarse: bool = False) -> list[float]:
+    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits."""
+    parameter = bench.effects[name].amplitudes[0]
+    step, (low, high) = parameter.step, parameter.limits
+    place = amplitude / step
+    if (
+        abs(place) <= 1.0 or bench.effects[name].kind == "numerics"
+    ):  # much finer runs would cost more than they say
+        wanted = [1.0 if place >= 0 else -1.0]
+    else:
+        ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
+        sign = math.copysign(1.0, place)
+        above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
+        below = [m for m in ladder if m < abs(place)] or [1.0]
+        wanted = [sign * below[-1], sign * above[0]]
+    nodes = []
+    for m in wanted:
+        value = float(np.clip(parameter.null + m * step, low, high)) - parameter.null
+        if value == 0.0:  # the limit is the null on that side
+            value = step
+        if value not in nodes:
+            nodes.append(value)
+    return nodes
