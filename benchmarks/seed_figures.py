@@ -20,7 +20,7 @@ STYLE = {"round": "-", "planar": "--"}
 def draw_shapes(study: Study) -> Figure:
     """Stopping time, depth over the law and v T_s/D against m v/A, nominal model with its best p_m."""
     p_m = fit("nominal", *study.hypotheses()["nominal"]).p_m
-    figure, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
+    figure, axes = plt.subplots(1, 3, figsize=(12, 4.1), layout="constrained")
     momentum = np.geomspace(0.2, 2.99, 60)
     for radius, (time, sigma) in PUBLISHED.items():
         axes[0].axhspan(time - sigma, time + sigma, color=COLOUR[radius], alpha=0.25, lw=0)
@@ -43,8 +43,8 @@ def draw_shapes(study: Study) -> Figure:
         ax.axvline(1.0, color="grey", lw=0.6)
         ax.set_xticks([0.2, 0.5, 1, 2, 3], ["0.2", "0.5", "1", "2", "3"], minor=False)
         ax.minorticks_off()
-    axes[0].set_ylim(0, None)
-    axes[0].legend(fontsize=7, loc="lower right")
+    axes[0].set_ylim(0, 7.6)
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize=8, loc="outside lower center", ncol=4)
     return figure
 
 
@@ -67,10 +67,17 @@ def draw_needed(study: Study) -> Figure:
             label=label,
         )
     ax.axvline(1300, color="tab:orange", ls=":", lw=1)
-    ax.set(xscale="log", xlabel="p_m that the figure asks for, Pa")
+    ax.set(
+        xscale="log",
+        xlabel="p_m that the figure asks for, Pa (dotted: the paper's 1.3 kPa)",
+        xlim=(150, 4000),
+    )
+    ax.set_xticks([200, 500, 1000, 2000], ["200", "500", "1000", "2000"])
+    ax.minorticks_off()
+    ax.grid(axis="y", lw=0.3)
     ax.set_yticks(range(len(rows)), [f"{row[0]}, m v/A {row[1]:.3g}" for row in rows])
     ax.invert_yaxis()
-    ax.legend(fontsize=7)
+    figure.legend(fontsize=8, loc="outside lower center", ncol=2)
     return figure
 
 
@@ -97,7 +104,7 @@ def draw_effects(study: Study) -> Figure:
         ax.set_title(title, fontsize=8)
         ax.grid(axis="y", lw=0.3)
     axes[0].set_yticks(range(len(fits)), [f.name for f in fits], fontsize=8)
-    axes[0].set_xscale("log")
+    axes[0].set_xlim(0, None)
     axes[0].invert_yaxis()
     return figure
 

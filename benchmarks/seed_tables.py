@@ -93,7 +93,7 @@ class Grid:
         own = [row for row in rows if row["group"] == group]
         self.p_m = np.array(sorted({float(row["p_m_Pa"]) for row in own}))
         self.speed = np.array(sorted({float(row["speed_m_s"]) for row in own}))
-        place = {(float(row["p_m_Pa"]), float(row["speed_m_s"])): row for row in own}
+        place = self._place = {(float(row["p_m_Pa"]), float(row["speed_m_s"])): row for row in own}
         self._splines, self._shares = {}, {}
         for name in own[0]:
             try:
@@ -113,6 +113,12 @@ class Grid:
                 self._splines[name] = RectBivariateSpline(
                     np.log(self.p_m), np.log(self.speed), np.log(values), kx=degree, ky=3, s=0
                 )
+
+    def nearest(self, row: Row) -> Row:
+        """The run at the p_m and speed of another."""
+        p_m = self.p_m[np.argmin(np.abs(self.p_m - float(row["p_m_Pa"])))]
+        speed = self.speed[np.argmin(np.abs(np.log(self.speed / float(row["speed_m_s"]))))]
+        return self._place[p_m, speed]
 
     def log(self, name: str, p_m: np.ndarray | float, speed: np.ndarray | float) -> np.ndarray:
         """ln of a column, times in ms and depths in mm for a radius of 1 mm; beyond the runs the edge's tangent in p_m."""
@@ -153,15 +159,15 @@ def _volume(row: Row, low: float = 0.20, high: float = 0.25) -> float:
 
 
 NULLS = {
-    "gravity": 0.0, "shear_strength": 1.0, "strength_rate": 0.0, "strength_rate_n1": 0.0, "surface_crust": 0.0,
-    "surface_crust_1mm": 0.0, "density_gradient": 0.0, "side_friction": 0.0, "contact_friction": 0.0, "strength_slope": 0.58,
+    "gravity": 0.0, "shear_strength": 1.0, "strength_rate": 0.0, "surface_crust": 0.0,
+    "density_gradient": 0.0, "side_friction": 0.0, "contact_friction": 0.0, "strength_slope": 0.58,
     "pore_gas": 0.0, "hard_floor": 0.02, "bulk_modulus": 45e3, "artificial_viscosity": 0.5, "strength_ceiling": 0.58,
     "filling_factor": 0.15, "projectile_mass": 1.0, "tensile_strength": 1.0,
 }  # fmt: skip
 _ROOT = (np.sqrt, np.square)
 _LOG = (np.log, np.exp)
 STRAIGHT: dict[str, tuple[Callable, Callable]] = {  # in what an effect's levels are interpolated, and back
-    "strength_rate": _ROOT, "strength_rate_n1": _ROOT, "pore_gas": _ROOT, "side_friction": _ROOT,
+    "strength_rate": _ROOT, "pore_gas": _ROOT, "side_friction": _ROOT,
     "hard_floor": (np.reciprocal, np.reciprocal), "shear_strength": _LOG, "bulk_modulus": _LOG,
     "artificial_viscosity": _LOG, "projectile_mass": _LOG, "tensile_strength": _LOG,
 }  # fmt: skip
@@ -171,33 +177,29 @@ class EffectGrid:
     """What one effect adds to ln T_s, ln D and the volume: (p_m of the runs, levels) -> interpolated."""
 
     def __init__(self, rows: list[Row], case: str, nominal: Grid, bead: Bead) -> None:
-        own = [row for row in rows if row["group"] == case]
+        made: dict[float, list[Row]] = {}
+        for row in rows:
+            if row["group"] == case:
+                made.setdefault(float(row["case"]), []).append(row)
+        whole = {level: found for level, found in made.items() if len(found) == len(P_M_EFFECT) * len(DROPS)}
         self.case, self.null = case, NULLS[case]
         self._straight, self._back = STRAIGHT.get(case, (np.asarray, np.asarray))
-        made: dict[float, dict[float, int]] = {}
-        for row in own:
-            counts = made.setdefault(float(row["case"]), {})
-            counts[float(row["p_m_Pa"])] = counts.get(float(row["p_m_Pa"]), 0) + 1
-        first = P_M_EFFECT[0]
-        whole = [level for level, counts in made.items() if counts.get(first) == 5]
-        self.p_m = np.array(sorted(p for p in P_M_EFFECT if all(made[level].get(p) == 5 for level in whole)))
-        self.levels = np.array(sorted({*whole, self.null}))
-        own = [r for r in own if float(r["case"]) in whole and float(r["p_m_Pa"]) in self.p_m]
+        self.p_m, self.levels = np.array(sorted(P_M_EFFECT)), np.array(sorted({*whole, self.null}))
         added = np.zeros((len(self.levels), len(self.p_m), 9))
         time, depth = nominal.drops(self.p_m[:, None])
-        for row in own:
-            i = int(np.argmin(np.abs(self.levels - float(row["case"]))))
-            j = int(np.argmin(np.abs(self.p_m - float(row["p_m_Pa"]))))
-            if row["tip"] == "sphere":
-                added[i, j, 8] = _volume(row) - bead(self.p_m[j])
-                continue
-            radius, speed = 1e-3 * float(row["radius_mm"]), float(row["speed_m_s"])
-            k = min(
-                range(4),
-                key=lambda k: abs(math.log(DROPS[k][0] / radius)) + abs(math.log(DROPS[k][1] / speed)),
-            )
-            added[i, j, k] = math.log(1e-3 * float(row["stopping_time_ms"])) - time[j, k]
-            added[i, j, 4 + k] = math.log(1e-3 * float(row["depth_mm"])) - depth[j, k]
+        between = math.log(0.8 / DROPS[0][1]) / math.log(
+            DROPS[1][1] / DROPS[0][1]
+        )  # where the bead's speed lies
+        for i, level in enumerate(self.levels):
+            for row in whole.get(float(level), []):
+                j = int(np.argmin(np.abs(self.p_m - float(row["p_m_Pa"]))))
+                k = min(range(4), key=lambda k: abs(math.log(1e-3 * float(row["radius_mm"]) / DROPS[k][0])) + abs(
+                    math.log(float(row["speed_m_s"]) / DROPS[k][1])))  # fmt: skip
+                added[i, j, k] = math.log(1e-3 * float(row["stopping_time_ms"])) - time[j, k]
+                added[i, j, 4 + k] = math.log(1e-3 * float(row["depth_mm"])) - depth[j, k]
+                if k < 2:  # the volume under a bead changes as that under a rod does
+                    share = between if k == 1 else 1.0 - between
+                    added[i, j, 8] += share * (_volume(row) - _volume(nominal.nearest(row)))
         x = self._straight(self.levels)
         order = np.argsort(x)
         self._shape = PchipInterpolator(x[order], added[order], axis=0)
@@ -254,7 +256,9 @@ def fit(name: str, values: Iterable[float], outputs: Callable[[float, np.ndarray
 class Study:
     """Everything that is read from the file of runs."""
 
-    def __init__(self, table: Path) -> None:
+    def __init__(self, table: Path, always: dict[str, float] | None = None) -> None:
+        """always: effects that every hypothesis holds, as ``{"gravity": 9.81}``."""
+        self.always = always or {}
         self.rows = read(table)
         self.round = Grid(self.rows)
         self.planar = Grid(self.rows, "planar")
@@ -262,31 +266,30 @@ class Study:
         self.effects = {
             case: EffectGrid(self.rows, case, self.round, self.bead)
             for case in LEVELS
-            if sum(r["group"] == case and float(r["p_m_Pa"]) == P_M_EFFECT[0] for r in self.rows) >= 5
+            if sum(r["group"] == case for r in self.rows) >= len(P_M_EFFECT) * len(DROPS)
         }
 
-    def nominal(self, p_m: np.ndarray) -> Outputs:
-        time, depth = self.round.drops(p_m[:, None])
-        return Outputs(time, depth, self.bead(p_m))
+    def nominal(self, p_m: np.ndarray, time: str = "stopping_time_ms") -> Outputs:
+        return self._add(Outputs(*self.round.drops(p_m[:, None], time), self.bead(p_m)), self.always, p_m)
 
     def with_effects(self, chosen: dict[str, float], p_m: np.ndarray) -> Outputs:
-        """Effects together: their logarithms added (the page checks the pair that matters by runs)."""
-        base = self.nominal(p_m)
-        added = sum(
-            (self.effects[case].added(value, p_m) for case, value in chosen.items()), np.zeros((len(p_m), 9))
-        )
-        return Outputs(
-            base.log_time + added[:, :4],
-            base.log_depth + added[:, 4:8],
-            np.maximum(base.volume + added[:, 8], 0),
-        )
+        """Effects together: their logarithms added."""
+        return self._add(self.nominal(p_m), chosen, p_m)
+
+    def _add(self, base: Outputs, chosen: dict[str, float], p_m: np.ndarray) -> Outputs:
+        added = sum((self.effects[case].added(x, p_m) for case, x in chosen.items()), np.zeros((len(p_m), 9)))
+        volume = np.maximum(base.volume + added[:, 8], 0.0)
+        return Outputs(base.log_time + added[:, :4], base.log_depth + added[:, 4:8], volume)
 
     def hypotheses(self) -> dict[str, tuple[Iterable[float], Callable[[float, np.ndarray], Outputs]]]:
         """Name -> amplitudes to try and the outputs they give."""
         found: dict = {"nominal": ([0.0], lambda _, p: self.nominal(p))}
         for case, effect in self.effects.items():
+            if case in self.always:
+                continue
             found[case] = (effect.values(), lambda x, p, case=case: self.with_effects({case: x}, p))
         found["trigger_offset"] = (np.linspace(-1.5e-3, 1.5e-3, 61), self._offset_time)
+        found["contact_offset"] = (np.linspace(-1.0e-3, 1.5e-3, 51), self._contact)
         found["surface_offset"] = (np.linspace(-0.4e-3, 0.4e-3, 81), self._offset_depth)
         found["stop_threshold"] = (np.linspace(0.0, 0.15, 31), self._threshold)
         found["sine_fit"] = ([0.0, 1.0], self._sine)
@@ -307,19 +310,21 @@ class Study:
     def _threshold(self, speed: float, p_m: np.ndarray) -> Outputs:
         base = self.nominal(p_m)
         stops = [0.0, 0.01, 0.02, 0.05, 0.1, 0.15]
-        times = [base.log_time] + [
-            self.round.drops(p_m[:, None], f"time_below_{s:g}_ms")[0] for s in stops[1:]
-        ]
+        times = [base.log_time, *(self.nominal(p_m, f"time_below_{s:g}_ms").log_time for s in stops[1:])]
         k = min(max(int(np.searchsorted(stops, speed)), 1), len(stops) - 1)
         part = (speed - stops[k - 1]) / (stops[k] - stops[k - 1])
         return Outputs((1 - part) * times[k - 1] + part * times[k], base.log_depth, base.volume)
 
     def _sine(self, on: float, p_m: np.ndarray) -> Outputs:
-        base = self.nominal(p_m)
-        return (
-            Outputs(self.round.drops(p_m[:, None], "sine_time_ms")[0], base.log_depth, base.volume)
-            if on
-            else base
+        return self.nominal(p_m, "sine_time_ms") if on else self.nominal(p_m)
+
+    def _contact(self, shift: float, p_m: np.ndarray) -> Outputs:
+        """Zero of time and of depth taken together, this long before contact."""
+        base, flown = self.nominal(p_m), shift * np.array([v for _, v in DROPS])
+        return Outputs(
+            np.log(np.maximum(np.exp(base.log_time) + shift, 1e-5)),
+            np.log(np.maximum(np.exp(base.log_depth) + flown, 1e-6)),
+            base.volume,
         )
 
     def _frame_rate(self, factor: float, p_m: np.ndarray) -> Outputs:
@@ -333,12 +338,13 @@ class Study:
     def _sizes(self, factor: float, p_m: np.ndarray) -> Outputs:
         """p_m of the dust under 3 mm over that under 1 mm: drift from drop to drop at its largest, or a size effect."""
         each = p_m[:, None] * np.array([1.0, 1.0, factor, factor])
-        return Outputs(*self.round.drops(each), self.bead(p_m))
+        return self._add(Outputs(*self.round.drops(each), self.bead(p_m)), self.always, p_m)
 
     def _rate_power(self, power: float, p_m: np.ndarray) -> Outputs:
         """p_m (rate / 1000 per s)^power with the rate v/R: hardening, or softening where negative."""
         rate = np.array([v / r for r, v in DROPS]) / 1000.0
-        return Outputs(*self.round.drops(p_m[:, None] * rate**power), self.bead(p_m * 1.6**power))
+        own = Outputs(*self.round.drops(p_m[:, None] * rate**power), self.bead(p_m * 1.6**power))
+        return self._add(own, self.always, p_m)
 
 
 def people(figures: np.ndarray) -> list[str]:
@@ -354,7 +360,7 @@ def needed_p_m(log_outputs: np.ndarray, target: float) -> float:
     below = np.nonzero((log_outputs[:-1] - target) * (log_outputs[1:] - target) <= 0)[0]
     if below.size == 0:
         return math.nan
-    k = int(below[0])
+    k = int(below[-1])  # the volume has a second branch, of dust crushed past the range
     part = (log_outputs[k] - target) / (log_outputs[k] - log_outputs[k + 1])
     return float(np.exp((1 - part) * np.log(P_M_FIT[k]) + part * np.log(P_M_FIT[k + 1])))
 
@@ -411,8 +417,6 @@ def fit_pairs(study: Study, names: Iterable[str], count: int = 13) -> list[tuple
     names, found = [n for n in names if n in study.effects], []
     for i, first in enumerate(names):
         for second in names[i + 1 :]:
-            if first.split("_")[:2] == second.split("_")[:2]:
-                continue  # two shapes of one effect
             for x in study.effects[first].values(count):
                 best = fit(
                     f"{first} {x:.3g}",
@@ -427,6 +431,99 @@ def fit_pairs(study: Study, names: Iterable[str], count: int = 13) -> list[tuple
     for each in found:
         kept.setdefault(each[:2], each)
     return list(kept.values())
+
+
+def fit_with_offset(study: Study) -> list[Fit]:
+    """A time offset together with each other effect that has runs; ``name`` holds the offset, ``value`` is the effect's."""
+    found = []
+    for case, effect in study.effects.items():
+        if case in study.always:
+            continue
+        best = None
+        for shift in np.linspace(0.0, 1.6e-3, 33):
+
+            def outputs(x: float, p_m: np.ndarray, case: str = case, shift: float = shift) -> Outputs:
+                base = study.with_effects({case: x}, p_m)
+                return Outputs(np.log(np.exp(base.log_time) + shift), base.log_depth, base.volume)
+
+            each = fit(f"trigger {1e3 * shift:.2f} ms + {case}", effect.values(21), outputs)
+            best = each if best is None or each.chi2 < best.chi2 else best
+        assert best is not None
+        found.append(best)
+    return sorted(found, key=lambda each: each.chi2)
+
+
+NEXT = {
+    "1 mm at 0.197 m/s": (2, 0, 1.0 / 3.0),
+    "3 mm at 0.591 m/s": (0, 1, 3.0),
+}  # column of figures at that speed, row, scale
+LONELY = ("trigger_offset", "contact_offset", "surface_offset")  # act on what is read, not on the drop
+
+
+def list_information(study: Study) -> list[tuple[str, float, str]]:
+    """Further measurement, expected information (bits), and what hypotheses predict of it.
+
+    For hypotheses without a length or time of their own in the dust, a drop at the speed of the other size is that drop,
+    scaled. Weights are exp(-χ²/2) with χ² over the best's reduced one, since not even the best fits; bits are the lower
+    bound of Kolchinsky & Tracey (2017), as in labsim's next_experiment.
+    """
+    brings = {
+        "gravity",
+        "strength_rate",
+        "surface_crust",
+        "density_gradient",
+        "hard_floor",
+        "sizes_differ",
+        "rate_power",
+    }
+    known = study.hypotheses()
+    standing = [each for each in fit_all(study) if each.name not in brings]
+    unit = standing[0].chi2 / (len(NAMES) - 2)
+    weight = np.exp(-0.5 * np.array([each.chi2 - standing[0].chi2 for each in standing]) / unit)
+    weight /= weight.sum()
+    found = []
+    for name, (column, _, scale) in NEXT.items():
+        means, said = [], []
+        for each in standing:
+            base = "nominal" if each.name in LONELY else each.name
+            own = known[base][1](0.0 if base == "nominal" else each.value, np.array([each.p_m]))
+            time, depth = (
+                math.exp(own.log_time[0, column]) * scale,
+                math.exp(own.log_depth[0, column]) * scale,
+            )
+            shift = each.value if each.name in ("trigger_offset", "contact_offset") else 0.0
+            time += shift
+            depth += each.value if each.name == "surface_offset" else 0.0
+            depth += shift * DROPS[column][1] if each.name == "contact_offset" else 0.0
+            means.append((time, depth))
+            if each.name in ("nominal", standing[0].name, "contact_offset"):
+                said.append(f"{each.name} T_s {1e3 * time:.2f} ms, D {1e3 * depth:.3f} mm")
+        for what, part in (("T_s", [0]), ("D", [1]), ("both", [0, 1])):
+            mean = np.array(means)[:, part]
+            errors = np.array(
+                [math.hypot(1e-4, 0.02 * (weight @ np.array(means))[0]), 0.05 * (weight @ np.array(means))[1]]
+            )
+            sigma = errors[part]
+            distance = np.sum(((mean[:, None, :] - mean[None, :, :]) / sigma) ** 2, axis=-1)
+            bits = -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+            found.append((f"{what} of {name}", bits, "; ".join(said)))
+    shifts = np.array(
+        [each.value if each.name in ("trigger_offset", "contact_offset") else 0.0 for each in standing]
+    )
+    distance = ((shifts[:, None] - shifts[None, :]) / 1e-4) ** 2
+    bits = -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+    found.append(("instant of contact to 0.1 ms, any drop", bits, "offset of the best fit against none"))
+    return sorted(found, key=lambda each: -each[1])
+
+
+def list_thresholds(study: Study, p_m: float) -> list[tuple[float, float, float, float]]:
+    """Threshold (m/s) and the T_s ratio 3 mm : 1 mm at m v/A 1 and 1.75 and at equal speed (0.591 m/s)."""
+    found = []
+    for stop in (0.0, 0.01, 0.02, 0.05, 0.1, 0.15):
+        name = f"time_below_{stop:g}_ms" if stop else "stopping_time_ms"
+        time = study.round.drops(np.array([p_m]), name)[0].ravel()
+        found.append((stop, math.exp(time[2] - time[0]), math.exp(time[3] - time[1]), 3.0))
+    return found
 
 
 CALIBRATION = (0, 4)  # T_s and D of 1 mm, as the seed calibrated
@@ -486,6 +583,20 @@ def fits_table(fits: Iterable[Fit]) -> str:
     return table(head, map(line, fits))
 
 
+def list_departures(rows: list[Row]) -> list[tuple[str, float, float, float]]:
+    """Effects with a length or a time: case, p_m, T_s and D of 3 mm over three times those of 1 mm, both at 0.197 m/s."""
+    keys = ("p_m_Pa", "speed_m_s", "case")
+    found = []
+    for small in rows:
+        case = small["group"].removesuffix("_next")
+        if case != small["group"] and float(small["radius_mm"]) < 1.0:
+            partners = [r for r in rows if r["group"] == case and all(r[k] == small[k] for k in keys)]
+            large = next(r for r in partners if float(r["radius_mm"]) > 1.0)
+            ratios = [float(large[k]) / 3.0 / float(small[k]) for k in ("stopping_time_ms", "depth_mm")]
+            found.append((f"{case} {small['case']}", float(small["p_m_Pa"]), *ratios))
+    return found
+
+
 SINGLE = (
     "group",
     "case",
@@ -497,12 +608,22 @@ SINGLE = (
     "stopping_time_ms",
     "viscous_share",
 )
-SINGLE_GROUPS = ("scaling", "bulk", "planar_K0", "planar_box", "planar_gravity", "planar_alpha", "wall", "K0")
+SINGLE_GROUPS = (
+    "scaling",
+    "bulk",
+    "planar_K0",
+    "planar_box",
+    "planar_gravity",
+    "planar_alpha",
+    "planar_error",
+    "wall",
+    "K0",
+)
 
 
 def report(file: Path) -> str:
     """All tables as text."""
-    study = Study(file)
+    study, heavy = Study(file), Study(file, {"gravity": 9.81})
     nominal = fit("nominal", *study.hypotheses()["nominal"])
     parts = [
         "p_m that each figure asks for, Pa",
@@ -516,14 +637,26 @@ def report(file: Path) -> str:
         ),
         "Spacing in use over a finer one",
         table("runs | spacings a radius | speed | ln D | ln T_s", list_errors(study.rows, study)),
-        "All hypotheses, p_m refitted",
+        "T_s ratio by the speed below which the projectile is called at rest",
+        table("threshold, m/s | m v/A 1 | m v/A 1.75 | equal speed", list_thresholds(study, nominal.p_m)),
+        "All hypotheses, p_m refitted, no gravity",
         fits_table(fit_all(study)),
-        "Pairs",
+        "All hypotheses, p_m refitted, with gravity",
+        fits_table(fit_all(heavy)),
+        "Pairs, no gravity",
         fits_table(
-            replace(each, name=f"{each.name} + {b}") for _, b, each in fit_pairs(study, study.effects)[:12]
+            replace(each, name=f"{each.name} + {b}") for _, b, each in fit_pairs(study, study.effects)[:8]
         ),
-        "Fitted to T_s and D of 1 mm alone: gain in ln p of the other seven numbers",
+        "A time offset and one effect, with gravity",
+        fits_table(fit_with_offset(heavy)[:8]),
+        "Fitted to T_s and D of 1 mm alone: gain in ln p of the other seven numbers, no gravity",
         table("hypothesis | p_m | amplitude | gain | χ² of the other seven", list_gains(study)),
+        "The same, with gravity",
+        table("hypothesis | p_m | amplitude | gain | χ² of the other seven", list_gains(heavy)),
+        "A further measurement: expected information, bits (no gravity)",
+        table("measurement | bits | predictions", list_information(study)),
+        "At 0.197 m/s: T_s and D of 3 mm over three times those of 1 mm",
+        table("effect | p_m | T_s | D", list_departures(study.rows)),
         "Single runs",
         table(
             " | ".join(SINGLE),

@@ -23,6 +23,15 @@ NOTEBOOKS = {
         [r"undisturbed dust 0\.1[45]", r"denser than 0\.20: 0\.\d+ ± 0\.\d+ sphere volumes"],
     ),
     "calibrate_p_m": (3, [r"p_m = 1[12]\d\d Pa", r"\d+ runs new"]),
+    "seed_experiment": (
+        3,
+        [
+            r"378 stored runs",
+            r"ratio at equal speed 3\.00",
+            r"stored stopping time (1\.00|0\.99)\d",
+            r"nominal: T_s ratio 2\.4",
+        ],
+    ),
     "find_the_cause": (3, [r"verdict: effect", r"pixel_scale +(1|0\.9\d*)\n"]),
 }
 
