@@ -71,7 +71,7 @@ def draw_track(
                 ecolor=BLUE,
                 elinewidth=0.7,
             )
-            limit = 1.2 * float(np.nanmax(np.abs(curve.residual[used]))) + 1e-6
+            limit = 1.05 * float(np.nanmax(np.abs(curve.residual[used]) + track.sigma[used])) + 1e-6
             residual_axes.set_ylim(-limit, limit)
         residual_axes.set_ylabel("residual (px)")
         residual_axes.set_xlabel("time from contact (ms)")
