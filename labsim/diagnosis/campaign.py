@@ -15,7 +15,7 @@ from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.workbench import Workbench
 from ..records import Campaign
-from .explore import explore, is_unexplained
+from .explore import explore, is_open
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Score, Screening, screen, screen_pairs
@@ -25,6 +25,8 @@ from .unknown import UnknownFit, fit_unknown
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
+ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
+MOST_EXPLORED = 3
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -99,7 +101,7 @@ def judge_campaign(
     unknown = fit_unknown(bench, nominal)
     fits = confirm_singles(bench, nominal, screening)
     explored: dict[str, Fit] = {}
-    if is_unexplained(nominal, fits, screening):
+    if is_open(bench, nominal, fits, screening):
         explored = explore(bench, nominal, screening)
         fits = confirm_explored(bench, nominal, fits, explored)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
@@ -199,7 +201,7 @@ def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: 
     known = {fit.hypothesis[0]: fit for fit in fits}
     top = max([nominal.evidence, *(fit.evidence for fit in [*fits, *explored.values()])])
     ranked = sorted(explored, key=lambda name: -explored[name].evidence)
-    for name in [name for name in ranked if explored[name].evidence > top - CLOSE][:MOST_RERUN]:
+    for name in [name for name in ranked if explored[name].evidence > top - ROUGH][:MOST_EXPLORED]:
         start = explored[name]
         fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
         if name not in known or fit.evidence > known[name].evidence:

@@ -26,13 +26,15 @@ HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed 
 FIRST_STEPS = 4
 
 
-def is_unexplained(nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
-    """Whether the nominal model fails and no effect fitted so far explains the data."""
+def is_open(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
+    """Whether the nominal model fails, and either nothing explains the data or only what p_m can be traded for."""
     best = screening.scores[0].log_bayes if screening.scores else -math.inf
     if best <= PROMISING and goodness_of_fit(nominal) >= FAILED:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    return found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < EXPLAINED
+    if found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < EXPLAINED:
+        return True
+    return bench.effects[found.hypothesis[0]].kind in KINDS
 
 
 def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, Fit]:

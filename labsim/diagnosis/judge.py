@@ -11,7 +11,7 @@ from ..inference.fitting import Fit, Hypothesis
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1
 PRIOR_PAIRS = 0.05  # all pairs together
-TEMPERATURE = 1.0  # evidences are divided by it
+TEMPERATURE = 3.0  # among causes: what tells one from another rests on details in which two solvers differ
 
 
 @dataclass(frozen=True)
@@ -31,22 +31,27 @@ def judge(
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
+    The best cause or pair counts in full against none and unknown. Among those that explain more than none, the others fall
+    off behind it by the difference of their gains over TEMPERATURE: they are told apart by residuals of the size of the
+    solver's own error.
+
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated.
     """
     singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
     pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
     share = (1 - PRIOR_NONE - PRIOR_UNKNOWN - PRIOR_PAIRS) / max(len(catalogue), 1)
-    weight: dict[Hypothesis, float] = {("none",): math.log(PRIOR_NONE) + nominal.evidence / TEMPERATURE}
-    weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + unknown_evidence / TEMPERATURE
-    confirmed = {fit.hypothesis[0] for fit in singles}
-    for fit in singles:
-        weight[fit.hypothesis] = math.log(share) + fit.evidence / TEMPERATURE
-    for name, log_bayes in screened.items():
-        if name not in confirmed:
-            weight[(name,)] = math.log(share) + (nominal.evidence + log_bayes) / TEMPERATURE
+    weight: dict[Hypothesis, float] = {("none",): math.log(PRIOR_NONE) + nominal.evidence}
+    weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + unknown_evidence
+    evidence: dict[Hypothesis, float] = {(name,): nominal.evidence + b for name, b in screened.items()}
+    evidence |= {fit.hypothesis: fit.evidence for fit in singles}  # re-simulated, where it was
+    evidence |= {fit.hypothesis: fit.evidence for fit in pairs}
+    gain = {hypothesis: value - nominal.evidence for hypothesis, value in evidence.items()}
+    most = max([0.0, *gain.values()])
     count = max(len(catalogue) * (len(catalogue) - 1) / 2, 1)
-    for fit in pairs:
-        weight[fit.hypothesis] = math.log(PRIOR_PAIRS / count) + fit.evidence / TEMPERATURE
+    for hypothesis, value in gain.items():
+        prior = share if len(hypothesis) == 1 else PRIOR_PAIRS / count
+        tempered = most - (most - max(value, 0.0)) / TEMPERATURE + min(value, 0.0)
+        weight[hypothesis] = math.log(prior) + nominal.evidence + tempered
     top = max(weight.values())
     total = sum(math.exp(value - top) for value in weight.values())
     ranked = sorted(

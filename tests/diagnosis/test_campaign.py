@@ -9,7 +9,7 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
-from labsim.diagnosis.judge import judge
+from labsim.diagnosis.judge import TEMPERATURE, judge
 from labsim.inference.fitting import Fit
 from labsim.inference.runs import RunStore
 
@@ -67,8 +67,8 @@ def test_probabilities_follow_bayes():
         ("none",): 0.5,
         ("unknown",): 0.1 * math.exp(-1),
         ("a",): share * math.exp(3),
-        ("b",): share * math.exp(0.5),
-        ("c",): share * math.exp(-2),
+        ("b",): share * math.exp(3 - (3 - 0.5) / TEMPERATURE),  # gains count a share of their difference
+        ("c",): share * math.exp(3 - 3 / TEMPERATURE - 2),  # losses in full
     }
     total = sum(weight.values())
     for hypothesis, probability in verdict.probabilities:
