@@ -22,7 +22,6 @@ FEWEST_SPEEDS = 3
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/numerics.md: 0.43 % of the depth left at that
 COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
-SCAN_COARSE_CELLS = 5  # of fingerprints in a map
 
 Change = Callable[[DropSetting], DropSetting]
 
@@ -106,8 +105,7 @@ class RunGrid:
         """The nominal model of the campaign for one node."""
         own = SCAN_CELLS if family.is_scan else self.cells
         if cells is not None:
-            coarse = cells < self.cells
-            own = cells if not family.is_scan else SCAN_COARSE_CELLS if coarse else SCAN_CELLS
+            own = SCAN_CELLS if family.is_scan else cells
         campaign, radius = self.campaign, family.projectile.tip_radius
         setting = DropSetting(
             projectile=family.projectile,

@@ -31,7 +31,7 @@ NUMERICAL_DEPTH = 0.01  # of the depth
 NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
 # of the variance of a map: with 1, maps of an independent simulator's nominal dust ask for another shear strength (4.5 σ)
-INFLATION = 5.0
+INFLATION = 3.0
 CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
 
 
