@@ -31,7 +31,8 @@ NUMERICAL_DEPTH = 0.01  # of the depth
 NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
 # of the variance of a map: with 1, maps of an independent simulator's nominal dust ask for another shear strength (4.5 σ)
-INFLATION = 3.0
+INFLATION = 6.0
+STRENGTH = 0.15  # of ln p_m by which the zones of two codes differ, most under shallow drops
 CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
 
 
@@ -140,7 +141,7 @@ def linearise_scan(
         (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here)
         / 0.02
         * (speed.sigma / speed.value),
-        (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02 * scatter,
+        (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02 * math.hypot(scatter, STRENGTH),
         np.append(here[:n] * GREY, 0.0),
         np.append((here[:n] - observed.undisturbed) * CONTRAST, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
