@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InferenceError
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
 from ..inference.fitting import Fit, Hypothesis, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
@@ -193,7 +195,10 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
         # finer runs for a suspicion of coarseness only where nothing else explains as much
         and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
-    return fits + [_fit_from_score(bench, nominal, score) for score in costly]
+    for score in costly:
+        with suppress(InferenceError, np.linalg.LinAlgError):  # its runs lead nowhere: no candidate
+            fits.append(_fit_from_score(bench, nominal, score))
+    return fits
 
 
 def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: dict[str, Fit]) -> list[Fit]:
@@ -203,7 +208,10 @@ def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: 
     ranked = sorted(explored, key=lambda name: -explored[name].evidence)
     for name in [name for name in ranked if explored[name].evidence > top - ROUGH][:MOST_EXPLORED]:
         start = explored[name]
-        fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
+        try:
+            fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
+        except (InferenceError, np.linalg.LinAlgError):
+            continue
         if name not in known or fit.evidence > known[name].evidence:
             known[name] = fit
     return list(known.values())
@@ -233,15 +241,12 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
         known = any(set(pair) == set(other) for other in starts)
         if not known and log_bayes > max(top, 0.0) + LEAST_GAIN:
             starts[pair] = nominal
-    return [
-        fit_hypothesis(
-            bench,
-            pair,
-            (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair}),
-            nuisances=start,
-        )
-        for pair, start in starts.items()
-    ]
+    fits = []
+    for pair, start in starts.items():
+        begin = (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair})
+        with suppress(InferenceError, np.linalg.LinAlgError):
+            fits.append(fit_hypothesis(bench, pair, begin, nuisances=start))
+    return fits
 
 
 def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:

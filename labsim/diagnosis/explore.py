@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..errors import InferenceError
 from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit, with_probes
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
@@ -51,13 +52,17 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, F
         if not bench.costs_runs(name) or bench.effects[name].kind not in KINDS:
             continue
         for start in starts:
-            first = _start_at(bench, nominal, name, start)
-            fit = fit_hypothesis(
-                bench, (name,), (start, {name: first}), coarse=True, nuisances=nominal, iterations=FIRST_STEPS
-            )
-            if fit.evidence > top - HOPELESS:
-                begin = (fit.log_p_m, fit.values)
-                fit = fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=fit)
+            try:
+                first = _start_at(bench, nominal, name, start)
+                begin = (start, {name: first})
+                fit = fit_hypothesis(
+                    bench, (name,), begin, coarse=True, nuisances=nominal, iterations=FIRST_STEPS
+                )
+                if fit.evidence > top - HOPELESS:
+                    begin = (fit.log_p_m, fit.values)
+                    fit = fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=fit)
+            except (InferenceError, np.linalg.LinAlgError):  # runs that lead nowhere: not from this start
+                continue
             if name not in found or fit.evidence > found[name].evidence:
                 found[name] = fit
             top = max(top, fit.evidence)

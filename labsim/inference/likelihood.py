@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from ..effects import Instrument
+from ..errors import InferenceError
 from ..records import FloatArray
 from .blocks import Block
 from .forward import Instant, ResponseTable, predict_depth, predict_speed
@@ -264,7 +265,7 @@ def solve_globals(
     information, gradient = np.zeros((len(names), len(names))), np.zeros(len(names))
     factors, designs, log_determinant = [], [], 0.0
     for block in blocks:
-        factor = cho_factor(block.covariance, lower=True)
+        factor = _factorise(block.covariance)
         design = np.stack([block.tangents[name] for name in names], axis=1)
         solved = cho_solve(factor, design)
         information += design.T @ solved
@@ -285,6 +286,16 @@ def solve_globals(
         weighted.append(cho_solve(factor, left))
         chi_square += float(left @ weighted[-1])
     return step, covariance, chi_square, log_determinant, weighted
+
+
+def _factorise(covariance: FloatArray) -> tuple[FloatArray, bool]:
+    """Cholesky factor; rounding is mended, what is not finite raises InferenceError: the model has no answer there."""
+    if not np.all(np.isfinite(covariance)):
+        raise InferenceError("simulation", "runs", "extrapolate to no finite depth here; see labsim runs")
+    try:
+        return cho_factor(covariance, lower=True)
+    except np.linalg.LinAlgError:
+        return cho_factor(covariance + 1e-9 * np.diag(np.diag(covariance)), lower=True)
 
 
 def update_nuisances(models: Sequence[DropModel], linear: Linearised, weighted: FloatArray) -> float:
