@@ -23,6 +23,9 @@ from .runs import Progress, RunStore
 from .scans import observe_scan
 from .workbench import Workbench, open_workbench
 
+LOST = 1e-6  # p value of a nominal fit that is not believed
+OTHER_STARTS = (500.0, 3500.0)  # Pa
+
 
 @dataclass(frozen=True)
 class Calibration:
@@ -73,7 +76,14 @@ def prepare(
     )
     bench.warnings += seen.warnings
     middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
-    return bench, fit_hypothesis(bench, (), (min(middle, math.log(1414.0)), {}))
+    nominal = fit_hypothesis(bench, (), (min(middle, math.log(1414.0)), {}))
+    if (
+        goodness_of_fit(nominal) < LOST
+    ):  # a law so wrong that Gauss-Newton may have run away: from other strengths too
+        starts = [math.log(p) for p in OTHER_STARTS if campaign.p_m_range[0] <= p <= campaign.p_m_range[1]]
+        fits = [nominal, *(fit_hypothesis(bench, (), (start, {})) for start in starts)]
+        nominal = max(fits, key=lambda fit: fit.evidence)
+    return bench, nominal
 
 
 def calibrate(

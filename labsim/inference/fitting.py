@@ -40,7 +40,7 @@ from .workbench import (
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
 SETTLED = 0.02  # of a standard deviation
-BEYOND = 0.1  # of ln p_m, how far outside its range an estimate may stray
+BEYOND = 0.7  # of ln p_m, how far outside its range an estimate may stray
 
 
 @dataclass(frozen=True)
