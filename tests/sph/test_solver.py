@@ -182,7 +182,7 @@ def test_a_run_that_blows_up_names_its_parameters():
 def test_clamp_near_the_upper_limit_is_reported():
     """A dust that hardly grows stronger is driven up to φ2: the run says so."""
     weak = Material(p_m=2.0, phi_2=0.2, tensile_log10_a=-1.0, bulk_modulus=45e3)
-    run = simulate(a_drop(material=weak, duration=1e-3))
+    run = simulate(a_drop(material=weak, duration=1e-3, depth=a_drop().extent[1]))
     assert any("φ2" in warning and "%" in warning for warning in run.warnings)
     assert any("did not stop" in warning for warning in run.warnings)
 
