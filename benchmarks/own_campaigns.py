@@ -128,7 +128,8 @@ def report(rows: list[dict]) -> None:
     table["exact"] = table["first"] == table.cause
     twins = [{other for other, cosine in alike if abs(cosine) > CONFUSABLE} for alike in table.alike]
     table["alone"] = [not names for names in twins]
-    table["class"] = table.exact | [name in names for name, names in zip(table["first"], twins, strict=True)]
+    alike = [name in names for name, names in zip(table["first"], twins, strict=True)]
+    table["class"] = table.exact | np.array(alike)
     table["named"] = ~table["first"].isin(["none", "unknown"]) & (table.probability > 0.5)
     nulls = table[table.cause == "none"]
     if len(nulls):
