@@ -116,7 +116,8 @@ def main() -> None:
         f"none called none {int((nulls['first'] == 'none').sum())} of {len(nulls)}; exact cause first "
         f"{int(others.exact.sum())} of {len(others)}, class {int(others['class'].sum())} of {len(others)}; wrong cause with "
         f"P > 0.5 {int(table['wrong>0.5'].sum())} of {len(table)}; mean Brier {table.Brier.mean():.3f}; p_m in its 90 % "
-        f"interval {int(table['in 90 %'].sum())} of {len(table)}; median gain {others.gain.median() if len(others) else math.nan:.2f}",
+        f"interval {int(table['in 90 %'].sum())} of {len(table)}; median gain "
+        f"{others.gain.median() if len(others) else math.nan:.2f}",
     ]
     text = "\n".join(lines)
     print(table.to_string(index=False))
