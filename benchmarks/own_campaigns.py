@@ -25,6 +25,7 @@ from scipy.stats import beta
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
+from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
@@ -53,7 +54,7 @@ def judge_hidden(job: tuple[Campaign, Path | None, TruthTable, Hidden, int, floa
     campaign, store_at, truth, hidden, seed, strength = job
     began = time.perf_counter()
     measurements = measure_hidden(truth, hidden, np.random.default_rng(seed))
-    found = judge_campaign(campaign, RunStore(store_at), workers=1, measurements=measurements)
+    found = judge_campaign(*prepare(campaign, RunStore(store_at), workers=1, measurements=measurements))
     names = found.screening.names
     alike = []
     if hidden.cause in names:
@@ -92,7 +93,7 @@ def choose_amplitudes(
 ) -> list:
     """(hidden, strength) of every effect at every strength that its limits allow, with alternating signs."""
     measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
-    found = judge_campaign(campaign, store, workers=workers, measurements=measurements)
+    found = judge_campaign(*prepare(campaign, store, workers=workers, measurements=measurements))
     signal = {score.name: score.signal for score in found.screening.scores}
     chosen = []
     for number, (name, effect) in enumerate(sorted(found.bench.effects.items())):

@@ -34,5 +34,9 @@ class InferenceError(LabsimError):
     """A calibration or a diagnosis that has nothing to stand on."""
 
 
+class ExtrapolationError(InferenceError):
+    """The runs that there are say nothing about a point of the parameters; a candidate that leads there is none."""
+
+
 class EffectError(LabsimError):
     """An effect's file that breaks the contract, or a value that an effect does not take."""

@@ -66,6 +66,17 @@ class ReducedScan:
     facts: dict = field(default_factory=dict)
 
     @property
+    def usable(self) -> np.ndarray:
+        """(nz, nr) True where a cell of dust or air was averaged and the bead's guard does not touch it."""
+        found = self.map
+        return np.isfinite(found.filling_factor) & np.isfinite(found.sigma) & ~self.masked
+
+    @property
+    def point_spread(self) -> float:
+        """m; one voxel where the bead's edge shows none."""
+        return self.blur if np.isfinite(self.blur) else self.scan.voxel
+
+    @property
     def bead_centre_z(self) -> float:
         """m, of the tip sphere's centre; 0 at the undisturbed surface, negative below."""
         return -self.map.tip_depth + self.map.bead_radius

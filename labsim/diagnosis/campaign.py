@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..errors import InferenceError
+from ..errors import ExtrapolationError
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
 from ..inference.fitting import Fit, Hypothesis, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
@@ -36,8 +36,8 @@ CONFUSABLE = 0.9  # cosine of fingerprints
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """Everything diagnose found; report.tables writes it as diagnosis.json."""
+class Judgement:
+    """What is at work in a campaign, before any posterior is sampled. best : the fit that the verdict rests on."""
 
     campaign: Campaign
     bench: Workbench
@@ -47,13 +47,19 @@ class Diagnosis:
     unknown: UnknownFit
     verdict: Verdict
     p_value: float
+    best: Fit
+
+
+@dataclass(frozen=True)
+class Diagnosis(Judgement):
+    """Everything diagnose found; report.tables writes it as diagnosis.json."""
+
     confusable: list[tuple[str, str, float]]
     held_out_nominal: HeldOut
     held_out_extended: HeldOut
     gain: Gain
     posterior_nominal: Posterior
     posterior_extended: Posterior
-    best: Fit
     scatter: tuple[float, float]
     runs_new: int
     runs_reused: int
@@ -61,43 +67,8 @@ class Diagnosis:
     warnings: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """What is at work in a campaign, before any posterior is sampled. best : the fit that the verdict rests on."""
-
-    bench: Workbench
-    nominal: Fit
-    rivals: list[Fit]
-    screening: Screening
-    unknown: UnknownFit
-    verdict: Verdict
-    p_value: float
-    best: Fit
-
-
-def judge_campaign(
-    campaign: Campaign,
-    store: RunStore,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    seed: int = 1,
-    progress: Progress | None = None,
-    use_scans: bool = True,
-    cells: int | None = None,
-    measurements: Measurements | None = None,
-) -> Judgement:
-    """Measure, calibrate, screen, confirm, judge. Raises LabsimError subclasses as its parts do."""
-    bench, nominal = prepare(
-        campaign,
-        store,
-        workers=workers,
-        scheduler=scheduler,
-        progress=progress,
-        use_scans=use_scans,
-        cells=cells,
-        measurements=measurements,
-    )
+def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgement:
+    """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do."""
     lay_out_shapes(bench)
     screening = screen(bench, nominal, np.random.default_rng(seed))
     unknown = fit_unknown(bench, nominal)
@@ -121,7 +92,7 @@ def judge_campaign(
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
     p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
-    return Judgement(bench, nominal, rivals, screening, unknown, verdict, p_value, best)
+    return Judgement(bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, best)
 
 
 def diagnose_campaign(
@@ -136,20 +107,21 @@ def diagnose_campaign(
     cells: int | None = None,
     measurements: Measurements | None = None,
 ) -> Diagnosis:
-    """judge_campaign, and what follows from it: gain on held-out drops, posteriors without and with the extension."""
+    """Measure and calibrate, judge_campaign, and what follows from it: gain on held-out drops, posteriors without and with the
+    extension."""
     began = time.perf_counter()
-    found = judge_campaign(
+    bench, nominal = prepare(
         campaign,
         store,
         workers=workers,
         scheduler=scheduler,
-        seed=seed,
         progress=progress,
         use_scans=use_scans,
         cells=cells,
         measurements=measurements,
     )
-    bench, nominal, best = found.bench, found.nominal, found.best
+    found = judge_campaign(bench, nominal, seed=seed)
+    best = found.best
     held_nominal, held_best = predict_held_out(bench, nominal), predict_held_out(bench, best)
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
@@ -157,26 +129,18 @@ def diagnose_campaign(
     if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
         warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")
     return Diagnosis(
-        campaign,
-        bench,
-        nominal,
-        found.rivals,
-        found.screening,
-        found.unknown,
-        found.verdict,
-        found.p_value,
-        list_confusable(found.screening),
-        held_nominal,
-        held_best,
-        measure_gain(held_nominal, held_best),
-        sample_fit(bench, nominal, seed=seed, progress=progress),
-        sample_fit(bench, best, seed=seed, progress=progress),
-        best,
-        estimate_scatter(bench, nominal),
-        store.new,
-        store.reused,
-        time.perf_counter() - began,
-        tuple(warnings),
+        **{each.name: getattr(found, each.name) for each in fields(Judgement)},
+        confusable=list_confusable(found.screening),
+        held_out_nominal=held_nominal,
+        held_out_extended=held_best,
+        gain=measure_gain(held_nominal, held_best),
+        posterior_nominal=sample_fit(bench, nominal, seed=seed, progress=progress),
+        posterior_extended=sample_fit(bench, best, seed=seed, progress=progress),
+        scatter=estimate_scatter(bench, nominal),
+        runs_new=store.new,
+        runs_reused=store.reused,
+        wall=time.perf_counter() - began,
+        warnings=tuple(warnings),
     )
 
 
@@ -196,7 +160,7 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
         and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
     for score in costly:
-        with suppress(InferenceError, np.linalg.LinAlgError):  # its runs lead nowhere: no candidate
+        with suppress(ExtrapolationError):  # its runs lead nowhere: no candidate
             fits.append(_fit_from_score(bench, nominal, score))
     return fits
 
@@ -210,7 +174,7 @@ def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: 
         start = explored[name]
         try:
             fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
-        except (InferenceError, np.linalg.LinAlgError):
+        except ExtrapolationError:
             continue
         if name not in known or fit.evidence > known[name].evidence:
             known[name] = fit
@@ -233,9 +197,8 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
         name = lead.hypothesis[0]
         again = screen(bench, lead, np.random.default_rng(0), [n for n in bench.effects if n != name])
         for score in again.scores[:MOST_PAIRS]:
-            pair = (name, score.name)
-            if score.log_bayes > LEAST_GAIN and tuple(reversed(pair)) not in starts:
-                starts[pair] = lead
+            if score.log_bayes > LEAST_GAIN and (score.name, name) not in starts:
+                starts[name, score.name] = lead
     top = ranked[0].evidence - nominal.evidence if ranked else 0.0
     for pair, log_bayes in screen_pairs(bench, screening)[:MOST_JOINT]:
         known = any(set(pair) == set(other) for other in starts)
@@ -244,7 +207,7 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
     fits = []
     for pair, start in starts.items():
         begin = (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair})
-        with suppress(InferenceError, np.linalg.LinAlgError):
+        with suppress(ExtrapolationError):
             fits.append(fit_hypothesis(bench, pair, begin, nuisances=start))
     return fits
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InferenceError
+from ..errors import ExtrapolationError
 from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit, with_probes
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
@@ -61,7 +61,7 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, F
                 if fit.evidence > top - HOPELESS:
                     begin = (fit.log_p_m, fit.values)
                     fit = fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=fit)
-            except (InferenceError, np.linalg.LinAlgError):  # runs that lead nowhere: not from this start
+            except ExtrapolationError:  # runs that lead nowhere: not from this start
                 continue
             if name not in found or fit.evidence > found[name].evidence:
                 found[name] = fit

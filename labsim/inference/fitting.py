@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import ndtr
 from scipy.stats import chi2
 
@@ -22,6 +21,7 @@ from .blocks import Block
 from .likelihood import (
     DropModel,
     Linearised,
+    chi_square,
     linearise,
     solve_globals,
     update_nuisances,
@@ -106,7 +106,7 @@ def fit_hypothesis(
     _ask(bench, hypothesis, log_p_m, values, coarse=coarse)
     linear = linearise_at(bench, models, speeds, log_p_m, values)
     step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
-    solved_here = _chi_here(linear)
+    solved_here = sum(chi_square(block) for block in linear.blocks)
     n = sum(block.residual.size for block in linear.blocks)
     log_likelihood = -0.5 * (solved_here + logdet + n * math.log(2 * math.pi))
     evidence = (
@@ -148,9 +148,8 @@ def goodness_of_fit(fit: Fit) -> float:
     """
     worst = []
     for k, block in enumerate(fit.linear.blocks):
-        white = solve_triangular(np.linalg.cholesky(block.covariance), block.residual, lower=True)
         free = 1 + len(fit.hypothesis) + 2 * len(fit.models) if k == 0 else 0
-        worst.append(float(chi2.sf(white @ white, max(white.size - free, 1))))
+        worst.append(float(chi2.sf(chi_square(block), max(block.residual.size - free, 1))))
     return min(1.0, len(worst) * min(worst))
 
 
@@ -224,14 +223,6 @@ def _linearise_dust(bench: Workbench, values: Mapping[str, float], probes: Probe
     moved = {name: (see(amps, insts), step) for name, (amps, insts, _offsets, step) in probes.items()}
     sigma = bench.campaign.sample.filling_factor_sigma
     return [linearise_undisturbed(bench.undisturbed, see(values, bench.instruments(values)), moved, sigma)]
-
-
-def _chi_here(linear: Linearised) -> float:
-    total = 0.0
-    for block in linear.blocks:
-        lower = np.linalg.cholesky(block.covariance)
-        total += float(np.sum(solve_triangular(lower, block.residual, lower=True) ** 2))
-    return total
 
 
 def _ask(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InferenceError
+from ..errors import ExtrapolationError
 from ..records import FloatArray
 from .curves import decode_depth, decode_rate
 from .grid import interpolation_weights, strength_node
@@ -40,7 +40,7 @@ class ResponseTable:
         across = interpolation_weights(self.log_speeds, log_speed)
         nearest = sorted(self.base, key=lambda index: abs(math.log(strength_node(index)) - log_p_m))[:4]
         if not nearest:
-            raise InferenceError("simulation", "runs", "every run of one projectile failed; see labsim runs")
+            raise ExtrapolationError("simulation", "runs", "every run of one projectile failed; see labsim runs")
         nodes = np.array([math.log(strength_node(index)) for index in nearest])
         code = sum(
             weight * (across @ self.base[index])

@@ -87,6 +87,23 @@ def interpolation_weights(nodes: FloatArray, at: float) -> FloatArray:
     return weights
 
 
+def set_nominal_drop(
+    campaign: Campaign, projectile: Projectile, speed: float, p_m: float, cells: float
+) -> DropSetting:
+    """What the campaign states, as one drop: speed m/s, p_m Pa, cells spacings in a tip radius."""
+    return DropSetting(
+        projectile=projectile,
+        impact_speed=speed,
+        material=campaign.material.replace(p_m=p_m),
+        filling_factor=campaign.sample.filling_factor,
+        monomer_density=campaign.sample.monomer_density,
+        gravity=campaign.gravity,
+        geometry=campaign.geometry,
+        spacing=projectile.tip_radius / cells,
+        after_stop=0.16,
+    )
+
+
 @dataclass
 class RunGrid:
     """Access to runs by (variant, p_m node, cells, family), each in the order of its speeds."""
@@ -103,21 +120,8 @@ class RunGrid:
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
-        own = SCAN_CELLS if family.is_scan else self.cells
-        if cells is not None:
-            own = SCAN_CELLS if family.is_scan else cells
-        campaign, radius = self.campaign, family.projectile.tip_radius
-        setting = DropSetting(
-            projectile=family.projectile,
-            impact_speed=speed,
-            material=campaign.material.replace(p_m=p_m),
-            filling_factor=campaign.sample.filling_factor,
-            monomer_density=campaign.sample.monomer_density,
-            gravity=campaign.gravity,
-            geometry=campaign.geometry,
-            spacing=radius / own,
-            after_stop=0.16,
-        )
+        own = SCAN_CELLS if family.is_scan else cells or self.cells
+        setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
         return setting if self.extension is None else self.extension(setting)
 
     def require(self, wanted: Sequence[Request], text: str) -> None:

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from ..effects import Instrument
-from ..errors import InferenceError
+from ..errors import ExtrapolationError
 from ..records import FloatArray
 from .blocks import Block
 from .forward import Instant, ResponseTable, predict_depth, predict_speed
@@ -242,19 +243,6 @@ def _numerical_covariance(parts: Sequence[tuple[FloatArray, FloatArray, float, f
     return np.outer(size, size) * np.exp(-0.5 * distance)
 
 
-@dataclass(frozen=True)
-class Solution:
-    """Best globals with their covariance. whitened : residual after the fit, whitened; chi_square, points of it."""
-
-    names: tuple[str, ...]
-    values: FloatArray
-    covariance: FloatArray
-    chi_square: float
-    points: int
-    log_likelihood: float  # maximum, priors of the globals not included
-    linear: Linearised
-
-
 def solve_globals(
     blocks: Sequence[Block], names: Sequence[str], priors: Mapping[str, tuple[float, float]]
 ) -> tuple[FloatArray, FloatArray, float, float, list[FloatArray]]:
@@ -289,13 +277,21 @@ def solve_globals(
 
 
 def _factorise(covariance: FloatArray) -> tuple[FloatArray, bool]:
-    """Cholesky factor; rounding is mended, what is not finite raises InferenceError: the model has no answer there."""
-    if not np.all(np.isfinite(covariance)):
-        raise InferenceError("simulation", "runs", "extrapolate to no finite depth here; see labsim runs")
+    """Cholesky factor; rounding is mended. Raises ExtrapolationError where the model has no answer."""
     try:
-        return cho_factor(covariance, lower=True)
+        if np.all(np.isfinite(covariance)):
+            with suppress(np.linalg.LinAlgError):
+                return cho_factor(covariance, lower=True)
+            return cho_factor(covariance + 1e-9 * np.diag(np.diag(covariance)), lower=True)
     except np.linalg.LinAlgError:
-        return cho_factor(covariance + 1e-9 * np.diag(np.diag(covariance)), lower=True)
+        pass
+    raise ExtrapolationError("simulation", "runs", "extrapolate to no finite depth here; see labsim runs")
+
+
+def chi_square(block: Block) -> float:
+    """Squared length of a block's whitened residual."""
+    white = solve_triangular(_factorise(block.covariance)[0], block.residual, lower=True)
+    return float(white @ white)
 
 
 def update_nuisances(models: Sequence[DropModel], linear: Linearised, weighted: FloatArray) -> float:
@@ -322,9 +318,3 @@ def update_nuisances(models: Sequence[DropModel], linear: Linearised, weighted: 
         )
         model.instant = moved
     return largest
-
-
-def whiten(covariance: FloatArray, *vectors: FloatArray) -> list[FloatArray]:
-    """Vectors in units of their noise, uncorrelated: L⁻¹ v with C = L Lᵀ."""
-    lower = np.linalg.cholesky(covariance)
-    return [solve_triangular(lower, vector, lower=True) for vector in vectors]

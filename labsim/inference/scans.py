@@ -22,8 +22,8 @@ from ..records import FloatArray, Scan
 from ..sph import DropRun
 from .blocks import Block
 from .forward import ResponseTable
+from .undisturbed import GREY
 
-GREY = 0.005  # relative, of the grey calibration, where nothing is stated
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
 NUMERICAL_DEPTH = 0.03  # of the depth: slow, shallow drops differ by up to 4 % between two codes
 # (share of φ - φ0, length in tip radii) of the solver's error: what two spacings and the interpolation between runs leave
@@ -60,9 +60,8 @@ def observe_scan(reduced: ReducedScan) -> ObservedScan:
     """Choose the cells: within three tip radii of the axis, from two below the tip to a third above it."""
     found, radius = reduced.map, reduced.scan.projectile.tip_radius
     r, z = np.meshgrid(found.r, found.z)
-    finite = np.isfinite(found.filling_factor) & np.isfinite(found.sigma) & ~reduced.masked
     inside = (r < 3 * radius) & (z < -0.25 * radius)
-    cells = finite & inside & (np.abs(z + found.tip_depth + 0.85 * radius) < 1.15 * radius)
+    cells = reduced.usable & inside & (np.abs(z + found.tip_depth + 0.85 * radius) < 1.15 * radius)
     return ObservedScan(
         reduced.scan,
         reduced,
@@ -82,7 +81,7 @@ def encode_scan_run(run: DropRun, observed: ObservedScan) -> FloatArray:
         dust.volume,
         dust.filling_factor,
         reduced.map,
-        blur=reduced.blur if math.isfinite(reduced.blur) else reduced.scan.voxel,
+        blur=reduced.point_spread,
         shift=run.penetration_depth - reduced.map.tip_depth,
         masked=~observed.cells,
     )
@@ -135,25 +134,22 @@ def linearise_scan(
         error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
         covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2 / length**2)
     covariance *= INFLATION
-    covariance[n, n] = (NUMERICAL_DEPTH * math.exp(model.table.code(log_p_m, log_speed, amplitudes)[0])) ** 2
+    covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
     speed = observed.scan.speed
+    spread = speed.sigma / speed.value
+    by_strength = (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02
     nuisances = [
-        (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here)
-        / 0.02
-        * (speed.sigma / speed.value),
-        (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here)
-        / 0.02
-        * math.hypot(scatter, STRENGTH),
+        (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here) / 0.02 * spread,
+        by_strength * math.hypot(scatter, STRENGTH),
         np.append(here[:n] * GREY, 0.0),
         np.append((here[:n] - observed.undisturbed) * CONTRAST, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
-    spread = speed.sigma / speed.value
-    pull = (log_speed - math.log(speed.value)) / spread
+    pull = (log_speed - model.stated) / spread
     for column in nuisances:
         covariance += np.outer(column, column)
     covariance[np.diag_indices(n + 1)] += 1e-12
-    tangents = {"ln_p_m": (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02}
+    tangents = {"ln_p_m": by_strength}
     for name, (amps, inst, step) in probes.items():
         tangents[name] = (predict(log_p_m, log_speed, amps, inst) - here) / step
     residual = data - here + nuisances[0] * pull  # the speed is zero-mean about what is stated

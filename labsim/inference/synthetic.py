@@ -20,7 +20,7 @@ from ..sph import DropRun, DropSetting
 from ..sph.particles import initial_filling_factor
 from .curves import encode_run
 from .forward import Instant, ResponseTable, predict_depth
-from .grid import interpolation_weights
+from .grid import interpolation_weights, set_nominal_drop
 from .measure import Measurements
 from .observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
 from .runs import Progress, RunStore
@@ -117,18 +117,7 @@ class TruthTable:
         return list_effects(self.campaign.folder)[name].for_campaign(self.campaign)
 
     def setting(self, projectile: Projectile, speed: float, p_m: float) -> DropSetting:
-        campaign = self.campaign
-        return DropSetting(
-            projectile=projectile,
-            impact_speed=speed,
-            material=campaign.material.replace(p_m=p_m),
-            filling_factor=campaign.sample.filling_factor,
-            monomer_density=campaign.sample.monomer_density,
-            gravity=campaign.gravity,
-            geometry=campaign.geometry,
-            spacing=projectile.tip_radius / TRUTH_CELLS,
-            after_stop=0.16,
-        )
+        return set_nominal_drop(self.campaign, projectile, speed, p_m, TRUTH_CELLS)
 
     def _apply(self, name: str, values: Mapping[str, float], setting: DropSetting) -> DropSetting:
         if not name:

@@ -51,10 +51,9 @@ def observe_undisturbed(reduced: ReducedScan) -> UndisturbedDust | None:
     r, z = np.meshgrid(found.r, found.z)
     centre = reduced.bead_centre_z
     apart = np.where(z > centre, r, np.hypot(r, z - centre))
-    spread = reduced.blur if math.isfinite(reduced.blur) else reduced.scan.voxel
+    spread = reduced.point_spread
     edge = 2.5 * max(spread, reduced.scan.voxel) + reduced.scan.voxel
-    good = (apart > REACH * radius) & (z < -edge) & ~reduced.masked
-    good &= np.isfinite(found.filling_factor) & np.isfinite(found.sigma) & (found.sigma > 0)
+    good = reduced.usable & (apart > REACH * radius) & (z < -edge) & (found.sigma > 0)
     depth, level, sigma = [], [], []
     inflate = math.sqrt(
         (1 + max(reduced.errors.correlation_r, 0.0)) / (1 - min(reduced.errors.correlation_r, 0.9))
@@ -66,7 +65,7 @@ def observe_undisturbed(reduced: ReducedScan) -> UndisturbedDust | None:
         sigma.append(inflate / math.sqrt(weight.sum()))
     if len(depth) < 4:
         return None
-    return UndisturbedDust(reduced.scan, np.array(depth), np.array(level), np.array(sigma), reduced.blur)
+    return UndisturbedDust(reduced.scan, np.array(depth), np.array(level), np.array(sigma), spread)
 
 
 Seen = tuple[DropSetting, Instrument]

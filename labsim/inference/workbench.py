@@ -58,11 +58,15 @@ class Workbench:
     scans: list[ScanModel] = field(default_factory=list)
     undisturbed: list[UndisturbedDust] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    shape_evidence: dict[str, float] = field(
-        default_factory=dict
-    )  # ln of what fitting a shape beforehand costs
+    # ln of what fitting a shape beforehand costs
+    shape_evidence: dict[str, float] = field(default_factory=dict)
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
     model: Model | None = None  # what the nominal model is extended by
+    # what the tables hold already: encoding a run means seeing it through every scan
+    _filled: set[tuple[int, int, str, int | None]] = field(default_factory=set, repr=False)
+    _plain: dict[tuple[int, int, int], list[tuple[ResponseTable, FloatArray | None]]] = field(
+        default_factory=dict, repr=False
+    )
 
     def _encode(
         self, number: int, index: int, variant: str, cells: int | None
@@ -84,17 +88,27 @@ class Workbench:
         ]
 
     def _fill_base(self, number: int, index: int) -> None:
+        if (number, index, "", None) in self._filled:
+            return
+        self._filled.add((number, index, "", None))
         for table, codes in self._encode(number, index, "", None):
-            if codes is not None and index not in table.base:
+            if codes is not None:
                 table.base[index] = codes
 
     def _fill_change(self, number: int, index: int, name: str, amplitude: float, cells: int) -> None:
-        before = self._encode(number, index, "", cells)
-        after = self._encode(number, index, self._variant(name, amplitude), cells)
-        for (table, codes), (_, plain) in zip(after, before, strict=True):
+        variant = self._variant(name, amplitude)
+        if (number, index, variant, cells) in self._filled:
+            return
+        self._filled.add((number, index, variant, cells))
+        before = self._plain.get((number, index, cells))
+        if before is None:
+            before = self._plain[number, index, cells] = self._encode(number, index, "", cells)
+        for (table, codes), (_, plain) in zip(
+            self._encode(number, index, variant, cells), before, strict=True
+        ):
             kept = table.changes if cells >= self.grid.cells else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
-            if codes is not None and plain is not None and amplitude not in entry:
+            if codes is not None and plain is not None:
                 entry[amplitude] = codes - plain
 
     def _scan_family(self, scan: ScanModel) -> int:
@@ -228,10 +242,7 @@ def open_workbench(
         members.setdefault((p.tip, p.tip_radius, round(p.mass, 12)), []).append(drop)
     tables, models = [], []
     for group in members.values():
-        speeds = [drop.impact_speed for drop in group]
-        slowest, fastest = min(speeds) / SPEED_MARGIN, max(speeds) * SPEED_MARGIN
-        nodes = speed_nodes(slowest, fastest)
-        few = few_positions(nodes, slowest, fastest)
+        nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
         projectile = group[0].drop.projectile
         stated = type(projectile)(projectile.tip, projectile.tip_radius, projectile.mass)
         families.append(Family(stated, nodes, False, few))
@@ -240,10 +251,7 @@ def open_workbench(
         models += [make_drop_model(drop, table) for drop in group]
     scan_models = []
     for (tip, radius, mass), group in _group_scans(scans).items():
-        speeds = [scan.scan.speed.value for scan in group]
-        slowest, fastest = min(speeds) / SCAN_MARGIN, max(speeds) * SCAN_MARGIN
-        nodes = speed_nodes(slowest, fastest)
-        few = few_positions(nodes, slowest, fastest)
+        nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in group], SCAN_MARGIN)
         families.append(Family(Projectile(tip, radius, mass), nodes, True, few))
         for scan in group:
             scan_models.append(ScanModel(scan, ResponseTable(np.log(nodes), few)))
@@ -293,6 +301,13 @@ def extend(bench: Workbench, model: Model) -> None:
     bench.grid.extension = apply
 
 
+def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Nodes that enclose the speeds with a margin, and those of them that changes are simulated at."""
+    slowest, fastest = min(speeds) / margin, max(speeds) * margin
+    nodes = speed_nodes(slowest, fastest)
+    return nodes, few_positions(nodes, slowest, fastest)
+
+
 def _group_scans(scans: Sequence[ObservedScan]) -> dict[tuple, list[ObservedScan]]:
     groups: dict[tuple, list[ObservedScan]] = {}
     for scan in scans:
@@ -337,9 +352,8 @@ def amplitude_nodes(bench: Workbench, name: str, amplitude: float, *, coarse: bo
     parameter = bench.effects[name].amplitudes[0]
     step, (low, high) = parameter.step, parameter.limits
     place = amplitude / step
-    if (
-        abs(place) <= 1.0 or bench.effects[name].kind == "numerics"
-    ):  # much finer runs would cost more than they say
+    # of the numerics, much finer runs would cost more than they say
+    if abs(place) <= 1.0 or bench.effects[name].kind == "numerics":
         wanted = [1.0 if place >= 0 else -1.0]
     else:
         ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
