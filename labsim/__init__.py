@@ -12,7 +12,11 @@ SI everywhere. Every error is a LabsimError whose text is one line that says wha
 from __future__ import annotations
 
 import importlib
+import os
 from typing import Any
+
+# OpenCV reads this once, when its first video is opened: damage is reported by labsim, in one line of its own words
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 __version__ = "0.1.0"
 

@@ -190,6 +190,7 @@ def test_ctrl_c_stops_at_once_with_one_line(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in a shell's background jobs
         cwd=SEED.parents[1],
     )
     assert process.stderr is not None
