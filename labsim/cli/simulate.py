@@ -24,8 +24,8 @@ from ..effects import (
 from ..errors import CampaignError, LabsimError
 from ..inference.convergence import extrapolate, refine
 from ..inference.planar import planar_setting
+from ..inference.published import impact_speed
 from ..inference.runs import RunStore, require_runs, write_run_file
-from ..inference.summary import impact_speed
 from ..records import Campaign, Drop, Material, Projectile
 from ..sph import DropRun, DropSetting, check_setting
 from ..tables import Table

@@ -1,9 +1,8 @@
 """p_m from published figures: penetration depth, stopping time, or both.
 
 Input: a campaign of ``summary`` records and a store of runs. Output: the posterior of p_m (emcee over an emulator of
-a few runs) and, beside it, what every other reading of the same figures would have given. The likelihood is normal in
-the logarithm of each figure; its variance holds the published uncertainty, the emulator's error on runs left out and
-the numerical error, taken as the change of the figure between two spacings. The prior is flat in ln p_m.
+a few runs) and, beside it, what every other reading of the same figures would have given (``readings``). The prior is
+flat in ln p_m.
 """
 
 from __future__ import annotations
@@ -17,70 +16,21 @@ from typing import Any
 
 import emcee
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
-from ..errors import InferenceError
 from ..records import Campaign, Drop, FloatArray
-from ..sph import DropRun
+from ..sph import DropRun, DropSetting
 from .emulator import Emulator, fit_emulator
-from .planar import READINGS, SPACING, campaign_setting, expected_raw_depth
+from .planar import SPACING, campaign_setting
+from .published import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
+from .readings import FigureLikelihood, NumericalError, Reading, integrate_reading, list_readings
 from .runs import Progress, RunStore, require_stopped
 
-USES = ("depth", "stopping_time")
 REFERENCE_P_M = 1300.0  # Pa, the seed's dynamic value: where the two spacings are compared
-OTHER_BULK_MODULI = (
-    4.5e3,
-    45.0e3,
-    300.0e3,
-)  # Pa; the literature on this dust has used the first and the last
+# Pa; the literature on this dust has used the first and the last
+OTHER_BULK_MODULI = (4.5e3, 45.0e3, 300.0e3)
 COARSE, FINE = SPACING, SPACING / 2  # m, at the radius the box belongs to
 DEGREE = 3
 RUNS_PER_EMULATOR = 7
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One published number as the planar run must show it: ``value`` in SI, ``sigma`` of its logarithm."""
-
-    drop: str
-    kind: str  # "depth" or "stopping_time"
-    value: float
-    sigma: float
-
-
-@dataclass(frozen=True)
-class NumericalError:
-    """A figure at two spacings and the same p_m."""
-
-    bulk_modulus: float
-    p_m: float
-    depth: tuple[float, float]  # m, coarse and fine
-    stopping_time: tuple[float, float]  # s
-    spacings: tuple[float, float]  # m
-
-    def relative(self, kind: str) -> float:
-        coarse, fine = getattr(self, kind)
-        return abs(math.log(coarse / fine))
-
-
-@dataclass(frozen=True)
-class Reading:
-    """p_m from one choice of figures, planar factor and bulk modulus."""
-
-    use: tuple[str, ...]
-    depth_reading: str
-    bulk_modulus: float
-    q05: float
-    q50: float
-    q95: float
-    misfit: float  # sum of squared standard deviations at the best p_m
-    at_limit: bool  # the posterior leans on a limit of the prior
-
-    @property
-    def name(self) -> str:
-        used = " + ".join(self.use).replace("_", " ")
-        reading = f", {self.depth_reading}" if "depth" in self.use else ""
-        return f"{used}{reading}, K0 {self.bulk_modulus / 1e3:g} kPa"
 
 
 @dataclass(frozen=True)
@@ -168,7 +118,7 @@ def calibrate_summary(
         runs.setdefault(place, []).append(run)
 
     emulators = {
-        place: fit_emulator(grid[:, None], _outputs(found), USES, DEGREE)
+        place: fit_emulator(grid[:, None], _outputs(found), FIGURE_KINDS, DEGREE)
         for place, found in runs.items()
         if place[0] != "spacing"
     }
@@ -183,9 +133,9 @@ def calibrate_summary(
             (coarse.setting.spacing, fine.setting.spacing),
         )
 
-    def likelihood(chosen: Sequence[str], chosen_reading: str, k0: float) -> _Likelihood:
+    def likelihood(chosen: Sequence[str], chosen_reading: str, k0: float) -> FigureLikelihood:
         figures = collect_figures(drops, chosen, chosen_reading)
-        return _Likelihood(
+        return FigureLikelihood(
             figures, {name: emulators[name, k0] for name in {f.drop for f in figures}}, numerical[k0]
         )
 
@@ -194,9 +144,9 @@ def calibrate_summary(
     samples = posterior.posterior["p_m"].values.ravel()
     found_readings = []
     for k0 in moduli:
-        for chosen, name in _list_readings(drops, reading, other_readings, tuple(use)):
+        for chosen, name in list_readings(drops, reading, other_readings, tuple(use)):
             found_readings.append(
-                _integrate(likelihood(chosen, name, k0), campaign.p_m_range, chosen, name, k0)
+                integrate_reading(likelihood(chosen, name, k0), campaign.p_m_range, chosen, name, k0)
             )
     notes = [warning for found in runs.values() for run in found for warning in run.warnings]
     if any(r.at_limit for r in found_readings if r.bulk_modulus == modulus and r.use == tuple(use)):
@@ -224,43 +174,6 @@ def calibrate_summary(
     )
 
 
-def choose_drops(campaign: Campaign, use: Sequence[str]) -> list[Drop]:
-    """The drops to calibrate on: those named in [planar], or all. Raises InferenceError where figures are missing."""
-    for name in use:
-        if name not in USES:
-            raise InferenceError(
-                "", "--use", f'"{name}" is not a figure; use one or more of {", ".join(USES)}'
-            )
-    if not use:
-        raise InferenceError("", "--use", f"names no figure; use one or more of {', '.join(USES)}")
-    where = campaign.folder / "campaign.toml"
-    if campaign.geometry != "planar":
-        raise InferenceError(
-            where,
-            "model.geometry",
-            'published figures are calibrated with planar runs; write geometry = "planar"',
-        )
-    wanted = campaign.planar.calibration_drops or tuple(drop.name for drop in campaign.drops)
-    drops = [drop for drop in campaign.drops if drop.name in wanted and drop.published is not None]
-    for name in use:
-        if not any(_published(drop, name) for drop in drops):
-            raise InferenceError(
-                where, "--use", f"no calibration drop has a published {name}; choose another figure"
-            )
-    return drops
-
-
-def collect_figures(drops: Sequence[Drop], use: Sequence[str], depth_reading: str) -> tuple[Figure, ...]:
-    """The published figures to calibrate on, as planar runs must show them."""
-    figures = []
-    for drop in drops:
-        for kind in use:
-            if (found := _published(drop, kind)) is not None:
-                value = expected_raw_depth(found.value, depth_reading) if kind == "depth" else found.value
-                figures.append(Figure(drop.name, kind, value, found.sigma / found.value))
-    return tuple(figures)
-
-
 def summarise(samples: FloatArray) -> dict[str, float]:
     """Mean, standard deviation and quantiles under the names of calibration.json."""
     q = np.quantile(samples, (0.05, 0.16, 0.50, 0.84, 0.95))
@@ -272,54 +185,18 @@ def summarise(samples: FloatArray) -> dict[str, float]:
     }
 
 
-def _published(drop: Drop, kind: str):  # type: ignore[no-untyped-def]
-    if drop.published is None:
-        return None
-    return drop.published.penetration_depth if kind == "depth" else drop.published.stopping_time
-
-
-def _setting(campaign: Campaign, drop: Drop, p_m: float, k0: float, spacing: float):  # type: ignore[no-untyped-def]
+def _setting(campaign: Campaign, drop: Drop, p_m: float, k0: float, spacing: float) -> DropSetting:
     return campaign_setting(
         campaign, drop.projectile, impact_speed(drop, campaign), p_m, bulk_modulus=k0, spacing=spacing
     )
-
-
-def impact_speed(drop: Drop, campaign: Campaign) -> float:
-    """The published speed at contact, or that of the free fall from the stated height (m/s)."""
-    if drop.published is not None and drop.published.impact_speed is not None:
-        return drop.published.impact_speed.value
-    assert drop.height is not None
-    return math.sqrt(2.0 * (campaign.gravity or 9.81) * drop.height.value)
 
 
 def _outputs(runs: Sequence[DropRun]) -> FloatArray:
     return np.array([[run.penetration_depth, run.stopping_time] for run in runs])
 
 
-@dataclass(frozen=True)
-class _Likelihood:
-    figures: tuple[Figure, ...]
-    emulators: dict[str, Emulator]
-    numerical: NumericalError
-
-    def residuals(self, ln_p_m: FloatArray) -> FloatArray:
-        """(figures, n), in standard deviations."""
-        rows = []
-        for figure in self.figures:
-            emulator = self.emulators[figure.drop]
-            column = emulator.column(figure.kind)
-            sigma = math.hypot(figure.sigma, emulator.sigma[column], self.numerical.relative(figure.kind))
-            rows.append(
-                (emulator.predict_log(np.exp(ln_p_m)[:, None])[:, column] - math.log(figure.value)) / sigma
-            )
-        return np.array(rows)
-
-    def __call__(self, ln_p_m: FloatArray) -> FloatArray:
-        return -0.5 * np.sum(self.residuals(ln_p_m) ** 2, axis=0)
-
-
 def _sample(
-    likelihood: _Likelihood, limits: tuple[float, float], seed: int, progress: Progress | None
+    likelihood: FigureLikelihood, limits: tuple[float, float], seed: int, progress: Progress | None
 ) -> tuple[Any, float, float]:
     """emcee on ln p_m; arviz.InferenceData, R-hat and effective sample size."""
     low, high = np.log(limits)
@@ -347,41 +224,3 @@ def _sample(
         attrs={"unit": "Pa", "prior": f"flat in ln p_m between {limits[0]:g} and {limits[1]:g} Pa"},
     )
     return data, float(arviz.rhat(data)["p_m"]), float(arviz.ess(data)["p_m"])
-
-
-def _list_readings(
-    drops: Sequence[Drop], reading: str, others: bool, use: tuple[str, ...]
-) -> list[tuple[tuple[str, ...], str]]:
-    if not others:
-        return [(use, reading)]
-    has = [kind for kind in USES if any(_published(drop, kind) for drop in drops)]
-    rows: list[tuple[tuple[str, ...], str]] = []
-    if "depth" in has:
-        rows += [(("depth",), name) for name in READINGS]
-    if "stopping_time" in has:
-        rows.append((("stopping_time",), reading))
-    if len(has) == 2:
-        rows += [(("depth", "stopping_time"), name) for name in READINGS]
-    return rows
-
-
-def _integrate(
-    likelihood: _Likelihood, limits: tuple[float, float], use: tuple[str, ...], depth_reading: str, k0: float
-) -> Reading:
-    """The same posterior by quadrature: one parameter needs no chain."""
-    ln_p_m = np.linspace(math.log(limits[0]), math.log(limits[1]), 2001)
-    log_like = likelihood(ln_p_m)
-    density = np.exp(log_like - log_like.max())
-    total = cumulative_trapezoid(density, ln_p_m, initial=0.0)
-    q05, q50, q95 = np.exp(np.interp((0.05, 0.5, 0.95), total / total[-1], ln_p_m))
-    best = int(np.argmax(log_like))
-    return Reading(
-        use=use,
-        depth_reading=depth_reading,
-        bulk_modulus=k0,
-        q05=float(q05),
-        q50=float(q50),
-        q95=float(q95),
-        misfit=float(-2.0 * log_like[best]),
-        at_limit=bool(max(density[0], density[-1]) > 0.05),
-    )

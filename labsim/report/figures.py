@@ -19,9 +19,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import KDTree
 
-from ..diagnosis.summary import SummaryDiagnosis, compacted_area
+from ..diagnosis.published_scan import compacted_area
+from ..diagnosis.summary import SummaryDiagnosis
 from ..inference.planar import expected_raw_depth, round_depth
-from ..inference.summary import SummaryCalibration, impact_speed
+from ..inference.published import impact_speed
+from ..inference.summary import SummaryCalibration
 from ..records import FloatArray
 from ..sph import DropRun, DropSetting
 

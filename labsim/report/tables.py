@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..diagnosis.summary import Prediction, SummaryDiagnosis, people
+from ..diagnosis.prediction import Prediction, people
+from ..diagnosis.summary import SummaryDiagnosis
 from ..inference.planar import ALPHA, READINGS
 from ..inference.summary import REFERENCE_P_M, SummaryCalibration
 

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from labsim.diagnosis.summary import Prediction, _p_value, _probability_wrong, describe
+from labsim.diagnosis.prediction import Prediction, describe
+from labsim.diagnosis.summary import bound_probability, judge_predictions
 
 RANDOM = np.random.default_rng(3)
 
@@ -38,7 +39,7 @@ def test_a_model_that_is_right_is_called_wrong_as_often_as_it_should_be() -> Non
             rows.append(row(kind, 1.0))
             samples.append(shared + noise + 0.03 * np.linspace(-1.7, 1.7, 2001))
             diagonal.append(0.0 if kind == "depth" else 0.04)
-        found.append(_p_value(rows, samples, diagonal))
+        found.append(judge_predictions(rows, samples, diagonal))
     below = np.mean(np.array(found) < 0.05)
     assert 0.02 < below < 0.09
     assert 0.4 < np.median(found) < 0.6
@@ -47,13 +48,13 @@ def test_a_model_that_is_right_is_called_wrong_as_often_as_it_should_be() -> Non
 def test_a_misfit_that_p_m_could_explain_counts_less_than_one_it_cannot() -> None:
     rows = [row("stopping_time", 1.0), row("stopping_time", 1.0)]
     width = 0.1 * np.linspace(-1.7, 1.7, 2001)
-    together = _p_value(rows, [0.15 + width, 0.15 + width], [0.03, 0.03])
-    apart = _p_value(rows, [0.15 + width, -0.15 + width], [0.03, 0.03])
+    together = judge_predictions(rows, [0.15 + width, 0.15 + width], [0.03, 0.03])
+    apart = judge_predictions(rows, [0.15 + width, -0.15 + width], [0.03, 0.03])
     assert together > 0.05 and apart < 1e-6
 
 
 def test_the_bound_of_the_probability() -> None:
-    assert _probability_wrong(1.0) == _probability_wrong(0.5) == 0.5
-    values = [_probability_wrong(p) for p in (0.3, 0.05, 0.01, 1e-6, 0.0)]
+    assert bound_probability(1.0) == bound_probability(0.5) == 0.5
+    values = [bound_probability(p) for p in (0.3, 0.05, 0.01, 1e-6, 0.0)]
     assert values == sorted(values)
-    assert _probability_wrong(0.05) == pytest.approx(1.0 / (1.0 - math.e * 0.05 * math.log(0.05)))
+    assert bound_probability(0.05) == pytest.approx(1.0 / (1.0 - math.e * 0.05 * math.log(0.05)))

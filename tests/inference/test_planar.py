@@ -9,7 +9,8 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.inference.planar import PLANAR_FACTOR, campaign_setting, expected_raw_depth, round_depth
-from labsim.inference.summary import choose_drops, collect_figures, summarise
+from labsim.inference.published import choose_drops, collect_figures
+from labsim.inference.summary import summarise
 
 SEED = read_campaign(Path(__file__).parents[2] / "data" / "guettler2009")
 
