@@ -92,7 +92,7 @@ def calibrate(
 
 def write_calibration(found: SummaryCalibration, folder: Path) -> tuple[dict, str]:
     """Files of a calibration; its summary and the lines for people."""
-    from ..report.figures import draw_corner, draw_fit
+    from ..report.summary_figures import draw_corner, draw_fit
     from ..report.tables import calibration_lines, calibration_summary
 
     summary = calibration_summary(found)

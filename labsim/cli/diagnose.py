@@ -70,7 +70,8 @@ def diagnose(
 
 def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:
     """Files of a calibration and its diagnosis; the summary and the lines for people."""
-    from ..report.figures import draw_compacted_volume, draw_density_field, draw_depth_law, draw_penetration
+    from ..report.run_figures import draw_density_field
+    from ..report.summary_figures import draw_compacted_volume, draw_depth_law, draw_penetration
     from ..report.summary_page import write_page
     from ..report.tables import diagnosis_lines, diagnosis_summary
 

@@ -174,7 +174,7 @@ def simulate(
 def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:
     """Files of the finest run; with several spacings the extrapolated values and their sigma."""
     from ..report.fields import run_summary, write_curve, write_fields
-    from ..report.figures import draw_density_field, draw_run
+    from ..report.run_figures import draw_density_field, draw_run
 
     run = min(runs, key=lambda each: each.setting.spacing)
     write_run_file(folder / "run.h5", run)

@@ -16,7 +16,7 @@ from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .drop_views import DropView
-from .figures import BLUE, GREY, INK, ORANGE, STYLE, new_figure
+from .look import BLUE, GREY, INK, ORANGE, STYLE, new_figure
 from .map_views import MapView
 
 COLOURS = (ORANGE, BLUE)  # nominal, extended

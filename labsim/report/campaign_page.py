@@ -13,20 +13,12 @@ from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
 from .campaign_tables import say_verdict
-from .campaign_words import (
-    BADGES,
-    describe_calibration,
-    describe_causes,
-    describe_gain,
-    describe_maps,
-    describe_measurement,
-    describe_misfit,
-    describe_numerics,
-    list_confusable,
-)
+from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
+from .cause_words import BADGES, describe_causes, describe_gain, list_confusable
 from .drop_views import DropView
 from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
 from .map_views import MapView
+from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
 from .provenance import trace_origin
 

@@ -1,4 +1,4 @@
-"""The words and tables of a measured campaign's page: numbers in the units of the laboratory, nothing decided anew."""
+"""What a measured campaign's page says of drops and calibration: numbers in the units of the laboratory, nothing decided anew."""
 
 from __future__ import annotations
 
@@ -7,33 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.campaign import Diagnosis
-from ..effects import Parameter
 from ..inference.fitting import Fit
 from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
-from .campaign_tables import say_missing
 from .drop_views import DropView
-from .map_views import MapView
 from .page import show_number
-
-BADGES = {
-    "none": "Nothing is wrong beyond the errors",
-    "effect": "A cause is found",
-    "unknown": "Wrong, and no listed cause explains it",
-}
-SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm"), "1": (1.0, "")}  # to what people see
-RARE = 0.01  # probability below which a cause is only named
+from .phrases import add_article, list_names, say_count, say_range, shown_unit
 
 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
     sample = campaign.sample
     frames = sum(model.observed.time.size for model in bench.models)
     words = (
-        f"{_count(len(views), 'drop')} with {frames} frames, {_count(len(campaign.scans), 'CT scan')}, into dust of filling "
-        f"factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, {sample.diameter * 1e3:g} mm wide and "
+        f"{say_count(len(views), 'drop')} with {frames} frames, {say_count(len(campaign.scans), 'CT scan')}, into dust of "
+        f"filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, {sample.diameter * 1e3:g} mm wide and "
         f"{sample.depth * 1e3:g} mm deep, in gas of {sample.gas_pressure:g} Pa. The nominal simulation is {campaign.geometry}, "
         f"with gravity of {campaign.gravity:g} m/s²."
     )
@@ -50,9 +39,9 @@ def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[D
         rows.append(
             {
                 "projectile": projectile,
-                "drops": _list_names([view.name for view in members]),
-                "speed": _range([view.speed for view in members], "{:.2f}"),
-                "height": _range(heights, "{:.3g}"),
+                "drops": list_names([view.name for view in members]),
+                "speed": say_range([view.speed for view in members], "{:.2f}"),
+                "height": say_range(heights, "{:.3g}"),
                 "rate": show_number(rate, "{:g}"),
                 "pixel": show_number(pixel * 1e6 if pixel else None, "{:g}"),
                 "used": sum(each.time.size for each in observed),
@@ -121,7 +110,7 @@ def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
     labels = list(views[0].simulated)
     standing = [sum(view.stands_out(label) for view in views) for label in labels]
     parts = [
-        f"with {_article(label)} {count} of {len(views)} drops"
+        f"with {add_article(label)} {count} of {len(views)} drops"
         for label, count in zip(labels, standing, strict=True)
     ]
     words = (
@@ -165,153 +154,6 @@ def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
     return {"words": words, "rows": rows, "text": text}
 
 
-def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView]) -> dict[str, Any]:
-    used = {scan.observed.name for scan in bench.scans}
-    shown = {view.name for view in maps}
-    words = []
-    compared = [view.name for view in maps if view.simulated]
-    if compared:
-        words.append(
-            f"The maps of {_list_names(compared)} are part of the likelihood. Simulated dust is seen through the own cells "
-            "and the blur of the scan, in the frame of the tip: moved so that its deepest tip lies where the bead ends. Only "
-            "cells that are compared carry a simulated value."
-        )
-    only = [view.name for view in maps if view.name not in used]
-    if only:
-        words.append(
-            f"The compacted zones of {_list_names(only)} are not part of the likelihood, so no simulated map stands beside the "
-            "measured one."
-        )
-    missing = [scan.name for scan in campaign.scans if scan.name not in shown]
-    if missing:
-        words.append(f"No map could be made of {_list_names(missing)}; the warnings say why.")
-    if bench.undisturbed:
-        words.append(
-            "The undisturbed dust below and beside the beads is compared with the stated filling factor."
-        )
-    rows: list[list[dict[str, str]]] = []
-    for k, view in enumerate(maps):
-        dense = float(np.nanmax(view.measured)) if np.isfinite(view.measured).any() else float("nan")
-        panels = [
-            {
-                "title": f"{view.name}: φ measured",
-                "figure": f"map{k}",
-                "text": f"Undisturbed φ {view.undisturbed:.4f}, up to {show_number(dense)} beside the bead, whose tip lies "
-                f"{view.map.tip_depth * 1e3:.2f} mm deep.",
-            }
-        ]
-        for q, name in enumerate(view.simulated):
-            panels.append(
-                {
-                    "title": f"{view.name}: φ simulated, {name}",
-                    "figure": f"map{k}_simulated{q}",
-                    "text": "On the compared cells.",
-                }
-            )
-            panels.append(
-                {
-                    "title": f"{view.name}: measured − {name}",
-                    "figure": f"map{k}_left{q}",
-                    "text": f"Rms {view.rms(name):.4f}; red is denser than simulated.",
-                }
-            )  # fmt: skip
-        rows.append(panels)
-    if not compared:  # one map a scan: side by side
-        rows = [[panel for row in rows for panel in row]]
-    undisturbed = ""
-    if bench.undisturbed:
-        means = [f"{dust.name} {np.mean(dust.filling_factor):.4f}" for dust in bench.undisturbed]
-        sample = campaign.sample
-        undisturbed = (
-            f"Filling factor of dust that no bead reached, against depth, in the mean {', '.join(means)}; "
-            f"stated are {sample.filling_factor:g} ± {sample.filling_factor_sigma:g} (band: two standard deviations)."
-        )
-    return {"words": " ".join(words), "rows": rows, "undisturbed": undisturbed}
-
-
-def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
-    rows: list[dict[str, Any]] = []
-    rest: list[str] = []
-    for cause in summary["causes"]:
-        name = " + ".join(cause["causes"])
-        if cause["probability"] < RARE and rows:
-            rest.append(f"{name} {cause['probability']:.4f}")
-            continue
-        parameters = []
-        for full, q in cause["parameters"].items():
-            factor, unit = SHOWN.get(q["unit"], (1.0, q["unit"]))
-            middle, low, high = (show_number(q[key] * factor, "{:.4g}") for key in ("q50", "q05", "q95"))
-            parameters.append(f"{full.split('.', 1)[1]} = {middle} ({low} to {high}) {unit}".rstrip())
-        rows.append(
-            {
-                "name": name,
-                "probability": f"{cause['probability']:.3f}",
-                "percent": f"{100 * cause['probability']:.1f}",
-                "title": _title(found, cause["causes"]),
-                "parameters": parameters,
-            }
-        )
-    words = (
-        "Posterior probabilities of every cause alone, of pairs where one is not enough, of the nominal model (none) and of a "
-        "smooth law without a name (unknown); together they are one."
-    )
-    if found.verdict.word == "unknown":
-        words += f" {_say_unknown(found)}"
-    against = [f"{name}: {reason}" for name, reason in found.bench.reasons.items()]
-    return {"words": words, "rows": rows, "rest": rest, "against": against}
-
-
-def _say_unknown(found: Diagnosis) -> str:
-    nearest = " + ".join(found.best.hypothesis) or "the nominal model"
-    return (
-        f"What is missing looks like {say_missing(found)}; the nearest that the catalogue comes to it is {nearest}, drawn beside "
-        "the nominal model."
-    )
-
-
-def _title(found: Diagnosis, causes: Sequence[str]) -> str:
-    fixed = {
-        "none": "The nominal simulation is right within its errors",
-        "unknown": "Something that no listed cause explains",
-    }
-    known = found.bench.effects
-    return "; ".join(fixed.get(name) or (known[name].title if name in known else name) for name in causes)
-
-
-def list_confusable(found: Diagnosis) -> list[tuple[str, str, str]]:
-    return [(first, second, show_number(cosine, "{:+.2f}")) for first, second, cosine in found.confusable]
-
-
-def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dict[str, Any]:
-    gain = summary["gain"]
-    nominal, extended, noise = (
-        show_number(1e6 * gain[key], "{:.1f}") for key in ("rms_nominal_m", "rms_extended_m", "rms_noise_m")
-    )
-    words = f"Each drop was predicted once from the others, with its own free fall: the nominal model misses by {nominal} µm rms"
-    if len(labels) > 1:
-        sigma = gain["log_score_difference_sigma"]
-        about = f" ± {show_number(sigma, '{:.1f}')}" if np.isfinite(sigma) else ""
-        fraction = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f}")
-        words += (
-            f", {labels[1]} by {extended} µm, and a true model would by {noise} µm; {fraction} % of the removable discrepancy is "
-            f"gone. The ln score of the held-out drops changes by {show_number(gain['log_score_difference'], '{:+.1f}')}{about}."
-        )
-    else:
-        words += (
-            f", a true model would by {noise} µm. Nothing is added to the model, so there is nothing to gain."
-        )
-    columns = [found.held_out_nominal.rms]
-    if len(labels) > 1:
-        columns.append(found.held_out_extended.rms)
-    columns.append(found.held_out_extended.expected)
-    rows = [
-        (name, *(show_number(1e6 * float(value), "{:.1f}") for value in values))
-        for name, *values in zip(found.held_out_nominal.names, *columns, strict=True)
-    ]
-    text = "Rms of each held-out drop below the surface for each model; the dash is what a true model would leave."
-    return {"words": words, "rows": rows, "text": text}
-
-
 def describe_numerics(error: dict[str, float], bench: Workbench) -> str:
     return (
         f"At {error['spacing_m'] * 1e6:.3g} µm between particles (the smallest tip; as many to every tip) the "
@@ -319,26 +161,3 @@ def describe_numerics(error: dict[str, float], bench: Workbench) -> str:
         f"likelihood carries {100 * bench.terms.numerical:.2g} % of the depth for it, alike for like drops, and a contact that "
         f"may be off by {100 * bench.terms.contact_offset:.2g} % of the tip radius in all drops together."
     )
-
-
-def shown_unit(parameter: Parameter) -> tuple[float, str]:
-    return SHOWN.get(parameter.unit, (1.0, parameter.unit))
-
-
-def _article(label: str) -> str:
-    return "the nominal model" if label == "nominal" else label
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number or 'no'} {noun}{'' if number == 1 else 's'}"
-
-
-def _list_names(names: Sequence[str]) -> str:
-    return ", ".join(names)
-
-
-def _range(values: Sequence[float], form: str) -> str:
-    if not values:
-        return "–"
-    low, high = form.format(min(values)), form.format(max(values))
-    return low if low == high else f"{low} to {high}"

@@ -13,7 +13,8 @@ from ..records import FloatArray
 from ..sph import DropRun, particles
 from ..sph.drop import evolve
 from ..video.movie import write_movie
-from .figures import STYLE, fill_density_field
+from .look import STYLE
+from .run_figures import fill_density_field
 
 PICTURES = 60
 

@@ -45,6 +45,7 @@ def write_page(diagnosis: SummaryDiagnosis, folder: Path) -> Path:
         {},
         name=campaign.name,
         description=campaign.description,
+        page_title="what the simulation gets wrong",
         tone=diagnosis.verdict,
         badge=BADGES[diagnosis.verdict],
         sentence=diagnosis.sentence,

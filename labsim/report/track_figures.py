@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..records import Camera, DecelerationCurve, FloatArray, Track
-from .figures import BLUE, GREEN, GREY, INK, ORANGE, new_figure
+from .look import BLUE, GREEN, GREY, INK, ORANGE, new_figure
 
 
 def draw_track(

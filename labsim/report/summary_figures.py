@@ -1,57 +1,20 @@
-"""Figures of a calibration and a diagnosis from published figures. Records in, PNG files out.
-
-One look for all: ink and four colours that stay apart for colour-blind eyes and in grey, values in mm, ms and kPa.
-"""
+"""Figures of a calibration and a diagnosis from published figures. Records in, PNG files out; mm, ms and kPa."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
 import corner
+import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
-from scipy.spatial import KDTree
 
 from ..diagnosis.published_scan import compacted_area
 from ..diagnosis.summary import SummaryDiagnosis
 from ..inference.planar import expected_raw_depth, round_depth
 from ..inference.published import impact_speed
 from ..inference.summary import SummaryCalibration
-from ..records import FloatArray
-from ..sph import DropRun, DropSetting
-
-INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
-STYLE: Any = {
-    "font.size": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": INK,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "legend.frameon": False,
-    "figure.dpi": 110,
-    "savefig.dpi": 150,
-    "lines.linewidth": 1.6,
-}
-
-
-@contextmanager
-def new_figure(path: Path, width: float = 6.4, height: float = 4.4) -> Iterator[Figure]:
-    """A figure in labsim's look, written to ``path`` and closed."""
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(width, height), layout="constrained")
-        try:
-            yield figure
-            figure.savefig(path)
-        finally:
-            plt.close(figure)
+from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, STYLE, new_figure
 
 
 def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
@@ -201,73 +164,10 @@ def draw_compacted_volume(diagnosis: SummaryDiagnosis, path: Path) -> Path:
             )
         axes.set(
             xlabel="volume filling factor φ",
-            ylabel="dust compacted beyond φ (cross-sections · sphere volumes)",
+            ylabel="dust beyond φ (areas of the cylinder ≙ sphere volumes)",
         )
-        axes.set_ylabel("dust beyond φ (areas of the cylinder ≙ sphere volumes)")
         axes.legend(loc="upper right")
     return path
-
-
-def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Path:
-    """Filling factor of every particle at the stop of a run, with the projectile's outline."""
-    dust = run.particles
-    with new_figure(path, 6.8, 4.4) as figure:
-        fill_density_field(
-            figure,
-            run.setting,
-            (dust.r, dust.z, dust.filling_factor),
-            run.penetration_depth,
-            run.penetration_depth,
-            title or f"at the stop, {run.stopping_time * 1e3:.2f} ms",
-        )
-    return path
-
-
-def fill_density_field(
-    figure: Figure,
-    setting: DropSetting,
-    dust: tuple[FloatArray, FloatArray, FloatArray],
-    depth: float,
-    deepest: float,
-    when: str,
-) -> None:
-    """The field into a figure. dust: r (or x), z in m and filling factor, (n,) each; depth of the tip now and at most."""
-    across, z, phi = dust
-    radius = setting.projectile.tip_radius
-    if setting.geometry == "axisymmetric":
-        across, z, phi = np.concatenate([-across, across]), np.tile(z, 2), np.tile(phi, 2)
-    half = 4.5 * radius
-    deep = deepest + 3.0 * radius
-    # each point shows the nearest particle; a spacing away, above the surface half of one, there is no dust
-    step = setting.spacing / 3.0
-    columns = np.arange(-half, half + step, step)
-    rows = np.arange(-deep, 1.2 * radius, step)
-    distance, nearest = KDTree(np.column_stack([across, z])).query(
-        np.stack(np.meshgrid(columns, rows), axis=-1)
-    )
-    reach = np.where(rows > 0.0, 0.5, 1.0)[:, None] * setting.spacing
-    field = np.where(distance < reach, phi[nearest], np.nan)
-    axes = figure.add_subplot()
-    drawn = axes.pcolormesh(
-        columns * 1e3, rows * 1e3, field, cmap="viridis", vmin=0.12, vmax=0.30, rasterized=True
-    )
-    centre = radius - depth
-    angle = np.linspace(0.0, 2 * np.pi, 181)
-    if setting.projectile.tip == "hemisphere":
-        angle = np.linspace(np.pi, 2 * np.pi, 91)
-    x, y = radius * np.cos(angle), centre + radius * np.sin(angle)
-    if setting.projectile.tip == "hemisphere":
-        top = max(2.0 * radius, centre + radius)
-        x, y = np.concatenate([[-radius], x, [radius]]), np.concatenate([[top], y, [top]])
-    axes.fill(x * 1e3, y * 1e3, facecolor="#DDDDDD", edgecolor=INK, lw=1.2)
-    axes.axhline(0.0, color=INK, lw=0.6, ls=":")
-    axes.set(aspect="equal", xlabel="mm", ylabel="height above the undisturbed surface (mm)")
-    axes.set_xlim(-half * 1e3, half * 1e3)
-    axes.set_ylim(-deep * 1e3, 1.2 * radius * 1e3)
-    figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
-    axes.set_title(
-        f"{2e3 * radius:g} mm at {setting.impact_speed:g} m/s, p_m {setting.material.p_m / 1e3:.2f} kPa, {when}"
-    )
 
 
 def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
@@ -371,32 +271,6 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
         forest.set(xlabel="p_m (kPa), median and 90 %")
         forest.set_title("orange: this one; grey: no p_m fits both (χ² > 6.6)")
         depth.set_title(f"{drop}: emulator (lines) and its runs (dots)")
-    return path
-
-
-def draw_run(run: DropRun, path: Path) -> Path:
-    """Depth, velocity and force of one run, and where the dust went."""
-    with new_figure(path, 7.2, 6.4) as figure:
-        panels = figure.subplots(3, 1, sharex=True)
-        planar = run.setting.geometry == "planar"
-        for axes, values, label in zip(
-            panels,
-            (run.depth * 1e3, run.velocity, run.force),
-            ("depth (mm)", "velocity (m/s)", "force (N/m)" if planar else "force (N)"),
-            strict=True,
-        ):
-            axes.plot(run.time * 1e3, values, color=BLUE)
-            axes.set_ylabel(label)
-            axes.axvline(run.stopping_time * 1e3, color=INK, lw=0.8, ls="--")
-        panels[0].invert_yaxis()
-        panels[1].axhline(0.0, color=GREY, lw=0.6)
-        panels[2].set_xlabel("time since contact (ms)")
-        setting = run.setting
-        panels[0].set_title(
-            f"{setting.projectile.tip} R {setting.projectile.tip_radius * 1e3:g} mm at {setting.impact_speed:g} m/s, "
-            f"p_m {setting.material.p_m / 1e3:.3g} kPa: depth {run.penetration_depth * 1e3:.3f} mm, "
-            f"T_s {run.stopping_time * 1e3:.2f} ms"
-        )
     return path
 
 

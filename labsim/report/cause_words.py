@@ -1,0 +1,103 @@
+"""What a diagnosed campaign's page says of causes, of what is alike, and of the gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..diagnosis.campaign import Diagnosis
+from .campaign_tables import say_missing
+from .page import show_number
+from .phrases import SHOWN
+
+BADGES = {
+    "none": "Nothing is wrong beyond the errors",
+    "effect": "A cause is found",
+    "unknown": "Wrong, and no listed cause explains it",
+}
+RARE = 0.01  # probability below which a cause is only named
+
+
+def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
+    rows: list[dict[str, Any]] = []
+    rest: list[str] = []
+    for cause in summary["causes"]:
+        name = " + ".join(cause["causes"])
+        if cause["probability"] < RARE and rows:
+            rest.append(f"{name} {cause['probability']:.4f}")
+            continue
+        parameters = []
+        for full, q in cause["parameters"].items():
+            factor, unit = SHOWN.get(q["unit"], (1.0, q["unit"]))
+            middle, low, high = (show_number(q[key] * factor, "{:.4g}") for key in ("q50", "q05", "q95"))
+            parameters.append(f"{full.split('.', 1)[1]} = {middle} ({low} to {high}) {unit}".rstrip())
+        rows.append(
+            {
+                "name": name,
+                "probability": f"{cause['probability']:.3f}",
+                "percent": f"{100 * cause['probability']:.1f}",
+                "title": _title(found, cause["causes"]),
+                "parameters": parameters,
+            }
+        )
+    words = (
+        "Posterior probabilities of every cause alone, of pairs where one is not enough, of the nominal model (none) and of a "
+        "smooth law without a name (unknown); together they are one."
+    )
+    if found.verdict.word == "unknown":
+        words += f" {_say_unknown(found)}"
+    against = [f"{name}: {reason}" for name, reason in found.bench.reasons.items()]
+    return {"words": words, "rows": rows, "rest": rest, "against": against}
+
+
+def _say_unknown(found: Diagnosis) -> str:
+    nearest = " + ".join(found.best.hypothesis) or "the nominal model"
+    return (
+        f"What is missing looks like {say_missing(found)}; the nearest that the catalogue comes to it is {nearest}, drawn beside "
+        "the nominal model."
+    )
+
+
+def _title(found: Diagnosis, causes: Sequence[str]) -> str:
+    fixed = {
+        "none": "The nominal simulation is right within its errors",
+        "unknown": "Something that no listed cause explains",
+    }
+    known = found.bench.effects
+    return "; ".join(fixed.get(name) or (known[name].title if name in known else name) for name in causes)
+
+
+def list_confusable(found: Diagnosis) -> list[tuple[str, str, str]]:
+    return [(first, second, show_number(cosine, "{:+.2f}")) for first, second, cosine in found.confusable]
+
+
+def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dict[str, Any]:
+    gain = summary["gain"]
+    nominal, extended, noise = (
+        show_number(1e6 * gain[key], "{:.1f}") for key in ("rms_nominal_m", "rms_extended_m", "rms_noise_m")
+    )
+    words = f"Each drop was predicted once from the others, with its own free fall: the nominal model misses by {nominal} µm rms"
+    if len(labels) > 1:
+        sigma = gain["log_score_difference_sigma"]
+        about = f" ± {show_number(sigma, '{:.1f}')}" if np.isfinite(sigma) else ""
+        fraction = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f}")
+        words += (
+            f", {labels[1]} by {extended} µm, and a true model would by {noise} µm; {fraction} % of the removable discrepancy is "
+            f"gone. The ln score of the held-out drops changes by {show_number(gain['log_score_difference'], '{:+.1f}')}{about}."
+        )
+    else:
+        words += (
+            f", a true model would by {noise} µm. Nothing is added to the model, so there is nothing to gain."
+        )
+    columns = [found.held_out_nominal.rms]
+    if len(labels) > 1:
+        columns.append(found.held_out_extended.rms)
+    columns.append(found.held_out_extended.expected)
+    rows = [
+        (name, *(show_number(1e6 * float(value), "{:.1f}") for value in values))
+        for name, *values in zip(found.held_out_nominal.names, *columns, strict=True)
+    ]
+    text = "Rms of each held-out drop below the surface for each model; the dash is what a true model would leave."
+    return {"words": words, "rows": rows, "text": text}
