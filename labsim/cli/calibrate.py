@@ -3,53 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..campaign import read_campaign
 from ..effects import list_effects
 from ..effects.model import read_model
-from ..errors import InferenceError
-from ..inference.planar import READINGS
 from ..inference.runs import RunStore
-from ..inference.summary import SummaryCalibration, calibrate_summary
+from ..inference.summary import SummaryCalibration
 from . import options
+from ._published import (
+    PUBLISHED_ONLY,
+    TRACKS_ONLY,
+    BulkModulus,
+    PlanarCorrection,
+    Use,
+    calibrate_figures,
+    refuse_options,
+)
 from .measured import calibrate_measured, has_tracks
-
-Use = Annotated[
-    str,
-    typer.Option(
-        "--use", help="Figures to calibrate on, with commas: depth, stopping_time. The others are a test."
-    ),
-]
-Correction = Annotated[
-    str | None,
-    typer.Option(
-        "--planar-correction", help=f"Planar factor: {', '.join(READINGS)}. Default: the campaign's."
-    ),
-]
-BulkModulus = Annotated[
-    float | None, typer.Option("--bulk-modulus-Pa", min=100.0, help="K at φ 0.15. Default: the campaign's.")
-]
 
 
 def calibrate(
     campaign: Annotated[Path, typer.Argument(help="Campaign folder.")],
     out: options.Out = None,
-    use: Use = "depth",
-    planar_correction: Correction = None,
-    bulk_modulus: BulkModulus = None,
     parameters: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--parameters", help="p_m and names of effects to fit with it, with commas (tracks only)."
+            help="p_m and names of effects to fit with it, with commas (tracks only). Default: p_m."
         ),
-    ] = "p_m",
-    model: Annotated[
-        Path | None,
-        typer.Option("--model", help="model.toml whose effects belong to the simulation (tracks only)."),
     ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="model.toml whose effects belong to the simulation (tracks only).")
+    ] = None,
+    use: Use = None,
+    planar_correction: PlanarCorrection = None,
+    bulk_modulus: BulkModulus = None,
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
     store: options.Store = None,
@@ -59,34 +49,30 @@ def calibrate(
 ) -> None:
     """Find p_m from a campaign: posterior.nc, calibration.json, corner.png, fit.png."""
     read = read_campaign(campaign)
-    figures = parse_use(use)
-    if has_tracks(read):
-        folder = options.make_output_folder(out, campaign, "calibrate")
-        names = tuple(name.strip() for name in parameters.split(",") if name.strip() not in ("", "p_m"))
-        with options.show_progress(quiet) as progress:
-            settings = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
-            if model is not None:
-                settings["model"] = read_model(model, list_effects(read))
-            summary, lines = calibrate_measured(read, folder, RunStore(store), names, settings)
-        options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
-        return
-    check_summary(read)
-    if model is not None:
-        raise InferenceError(model, "--model", "is for campaigns with tracks; these are published figures")
+    tracks = has_tracks(read)
+    if tracks:
+        refuse_options(
+            read, PUBLISHED_ONLY, use=use, planar_correction=planar_correction, bulk_modulus=bulk_modulus
+        )
+    else:
+        refuse_options(read, TRACKS_ONLY, parameters=parameters, model=model)
+    extended = read_model(model, list_effects(read)) if model is not None else None
     folder = options.make_output_folder(out, campaign, "calibrate")
     with options.show_progress(quiet) as progress:
-        found = calibrate_summary(
-            read,
-            RunStore(store),
-            use=figures,
-            depth_reading=parse_correction(planar_correction),
-            bulk_modulus=bulk_modulus,
-            workers=workers,
-            scheduler=scheduler,
-            seed=seed,
-            progress=progress,
-        )
-    summary, lines = write_calibration(found, folder)
+        settings: dict[str, Any] = {
+            "workers": workers,
+            "scheduler": scheduler,
+            "seed": seed,
+            "progress": progress,
+        }
+        if tracks:
+            named = [name.strip() for name in (parameters or "").split(",")]
+            names = tuple(name for name in named if name not in ("", "p_m"))
+            settings["model"] = extended
+            summary, lines = calibrate_measured(read, folder, RunStore(store), names, settings)
+        else:
+            found = calibrate_figures(read, RunStore(store), use, planar_correction, bulk_modulus, settings)
+            summary, lines = write_calibration(found, folder)
     options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
 
 
@@ -102,27 +88,3 @@ def write_calibration(found: SummaryCalibration, folder: Path) -> tuple[dict, st
     draw_corner(found, folder / "corner.png")
     draw_fit(found, folder / "fit.png")
     return summary, calibration_lines(found)
-
-
-def parse_use(use: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name.strip().replace("-", "_") for name in use.split(",") if name.strip()))
-
-
-def parse_correction(name: str | None) -> str | None:
-    if name is not None and name not in READINGS:
-        raise InferenceError(
-            "", "--planar-correction", f'"{name}" is not known; use one of {", ".join(READINGS)}'
-        )
-    return name
-
-
-def check_summary(campaign) -> None:  # type: ignore[no-untyped-def]
-    """Only published figures can be calibrated on so far; tracks are refused, not guessed at."""
-    kinds = {drop.record.kind for drop in campaign.drops}
-    if kinds != {"summary"}:
-        raise InferenceError(
-            campaign.folder,
-            "record.kind",
-            f"this version calibrates on published figures only, not on {' and '.join(sorted(kinds - {'summary'}))}; "
-            'use drops of kind "summary"',
-        )

@@ -11,25 +11,17 @@ from ..campaign import MATERIAL_KEYS, read_campaign
 from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
 from ..effects import Model, write_model
 from ..inference.runs import RunStore
-from ..inference.summary import calibrate_summary
 from . import options
-from .calibrate import (
-    BulkModulus,
-    Correction,
-    Use,
-    check_summary,
-    parse_correction,
-    parse_use,
-    write_calibration,
-)
+from ._published import PUBLISHED_ONLY, BulkModulus, PlanarCorrection, Use, calibrate_figures, refuse_options
+from .calibrate import write_calibration
 from .measured import diagnose_measured, has_tracks
 
 
 def diagnose(
     campaign: Annotated[Path, typer.Argument(help="Campaign folder.")],
     out: options.Out = None,
-    use: Use = "depth",
-    planar_correction: Correction = None,
+    use: Use = None,
+    planar_correction: PlanarCorrection = None,
     bulk_modulus: BulkModulus = None,
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
@@ -40,31 +32,22 @@ def diagnose(
 ) -> None:
     """Calibrate, predict what was not calibrated, and say what the simulation gets wrong."""
     read = read_campaign(campaign)
-    figures = parse_use(use)
-    if has_tracks(read):
-        folder = options.make_output_folder(out, campaign, "diagnose")
-        with options.show_progress(quiet) as progress:
-            settings = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
-            summary, lines = diagnose_measured(read, folder, RunStore(store), settings)
-        options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
-        return
-    check_summary(read)
-    folder = options.make_output_folder(out, campaign, "diagnose")
-    opened = RunStore(store)
-    with options.show_progress(quiet) as progress:
-        calibration = calibrate_summary(
-            read,
-            opened,
-            use=figures,
-            depth_reading=parse_correction(planar_correction),
-            bulk_modulus=bulk_modulus,
-            workers=workers,
-            scheduler=scheduler,
-            seed=seed,
-            progress=progress,
+    tracks = has_tracks(read)
+    if tracks:
+        refuse_options(
+            read, PUBLISHED_ONLY, use=use, planar_correction=planar_correction, bulk_modulus=bulk_modulus
         )
-        found = diagnose_summary(calibration, opened, workers=workers, scheduler=scheduler, progress=progress)
-    summary, lines = write_diagnosis(found, folder)
+    folder, opened = options.make_output_folder(out, campaign, "diagnose"), RunStore(store)
+    with options.show_progress(quiet) as progress:
+        settings = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
+        if tracks:
+            summary, lines = diagnose_measured(read, folder, opened, settings)
+        else:
+            calibration = calibrate_figures(read, opened, use, planar_correction, bulk_modulus, settings)
+            found = diagnose_summary(
+                calibration, opened, workers=workers, scheduler=scheduler, progress=progress
+            )
+            summary, lines = write_diagnosis(found, folder)
     options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
 
 
