@@ -8,12 +8,16 @@ leaves with status 2. Names that start with an underscore are not commands.
 
 from __future__ import annotations
 
+import ast
 import importlib
+import importlib.util
 import keyword
 import os
 import pkgutil
 import sys
+import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -36,8 +40,29 @@ def list_command_files() -> list[str]:
     return sorted(name for name in names if name not in NOT_COMMANDS and not name.startswith("_"))
 
 
+def say_purpose(module_name: str) -> str:
+    """What stands behind the colon in the first line of a command's file, read without importing it."""
+    spec = importlib.util.find_spec(f"{__name__}.{module_name}")
+    if spec is None or spec.origin is None:
+        return ""
+    docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
+    first = docstring.partition("\n")[0]
+    return (first.partition(": ")[2] or first).rstrip(".")
+
+
 class CommandFolder(typer.core.TyperGroup):
     """Finds commands by listing this folder and imports only the one that is asked for."""
+
+    def format_commands(self, ctx: object, formatter: Any) -> None:
+        names = dict(zip(self.list_commands(ctx), list_command_files(), strict=True))
+        room = formatter.width - max(map(len, names)) - 6
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [
+                    (name, textwrap.shorten(say_purpose(file), room, placeholder=" …"))
+                    for name, file in names.items()
+                ]
+            )
 
     def list_commands(self, ctx: object) -> list[str]:
         return [name.rstrip("_").replace("_", "-") for name in list_command_files()]

@@ -1,4 +1,4 @@
-"""``labsim check``: read everything, say what is there, what is missing and what looks odd."""
+"""``labsim check``: say what is in a campaign, what is missing, what looks odd."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``labsim ct SCAN``: slices to the filling-factor map, its compacted volume and their pictures; of a campaign, all scans."""
+"""``labsim ct``: slices become the map of the filling factor and its compacted volume."""
 
 from __future__ import annotations
 

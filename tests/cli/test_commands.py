@@ -16,10 +16,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labsim.cli import main
+from labsim.cli import list_command_files, main
 from labsim.inference.runs import read_run_file
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"
+TRACKS = SEED.parent / "campaigns" / "p01"
 QUICK = [
     "--geometry",
     "planar",
@@ -106,6 +107,14 @@ MISTAKES = {
     "drop unknown": (["simulate", "--campaign", str(SEED), "--drop", "D99"], ["D99", "name one of", "S01"]),
     "phi beyond phi2": (["simulate", "--filling-factor", "0.6"], ["filling_factor", "0.6"]),
     "unknown figure": (["calibrate", str(SEED), "--use", "width"], ["--use", "width", "stopping_time"]),
+    "figures of tracks": (
+        ["calibrate", str(TRACKS), "--use", "depth"],
+        ["--use", "has tracks", "leave it out"],
+    ),
+    "parameters of figures": (
+        ["calibrate", str(SEED), "--parameters", "p_m"],
+        ["--parameters", "leave it out"],
+    ),
     "no figure": (["calibrate", str(SEED), "--use", ","], ["--use", "names no figure"]),
     "unknown factor": (["calibrate", str(SEED), "--planar-correction", "x"], ["multiply_exp"]),
     "into the campaign": (["diagnose", str(SEED), "-o", str(SEED / "out")], ["--out", "lies inside"]),
@@ -143,16 +152,22 @@ def test_runs_are_listed_verified_and_pruned(tmp_path: Path, capsys: pytest.Capt
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["runs"] == 0
 
 
-def test_help_lists_every_command_and_starts_quickly() -> None:
+def test_help_fits_a_screen_and_imports_nothing_heavy() -> None:
     shown = subprocess.run(
-        [sys.executable, "-m", "labsim", "--help"],
+        [sys.executable, "-X", "importtime", "-m", "labsim", "--help"],
         capture_output=True,
         text=True,
         check=True,
         cwd=Path(SEED).parents[1],
+        env={**os.environ, "COLUMNS": "80"},
     )
-    for command in ("calibrate", "check", "demo", "diagnose", "runs", "simulate"):
-        assert f"\n  {command} " in shown.stdout
+    for command in list_command_files():
+        line = next(line for line in shown.stdout.splitlines() if line.startswith(f"  {command} "))
+        assert len(line.split(maxsplit=1)[1]) > 5
+    lines = shown.stdout.splitlines()
+    assert len(lines) <= 24 and max(map(len, lines)) <= 80
+    imported = {line.rpartition("|")[2].strip() for line in shown.stderr.splitlines()}
+    assert not imported & {"numba", "scipy", "matplotlib", "emcee", "cv2", "labsim.cli.diagnose"}
 
 
 def test_the_default_output_is_a_new_folder_beside_the_input(tmp_path: Path) -> None:
@@ -190,7 +205,9 @@ def test_ctrl_c_stops_at_once_with_one_line(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in a shell's background jobs
+        preexec_fn=lambda: signal.signal(
+            signal.SIGINT, signal.SIG_DFL
+        ),  # ignored in a shell's background jobs
         cwd=SEED.parents[1],
     )
     assert process.stderr is not None
