@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import erf
 
 from ..records import FloatArray
-from .scene import Noise
+from .noise import Noise
 
 REACH = 7.0  # px of background that are looked at around the disc
 STEPS = 30

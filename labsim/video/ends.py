@@ -13,11 +13,12 @@ from scipy.optimize import least_squares
 from scipy.special import erf
 
 from ..records import FloatArray
-from .registration import MARGIN, Template, register, sample_opacity
+from .clipping import extend_edge
+from .registration import register
 from .scene import Scene
+from .template import MARGIN, Template, sample_opacity
 
 PASSES = 4
-CLIPPED_BELOW = 0.25  # opacity; darker pixels hold no mean over samples of which some were clipped
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,16 @@ def build_template(
             if spot is None:
                 continue
             sampled = sample_opacity(
-                view.picture, scene.background, usable, shape, top, left, *spot, noise=scene.noise
+                view.picture,
+                scene.background,
+                usable,
+                shape,
+                top,
+                left,
+                *spot,
+                noise=scene.noise,
+                ceiling=scene.limit,
+                known=template,
             )
             if sampled is None:
                 continue
@@ -53,6 +63,8 @@ def build_template(
         opacity = np.where(weight > 0, total / np.maximum(weight, 1e-30), 0.0)
         if np.any(weight == 0):
             opacity = _fill_nearest(opacity, weight > 0)
+        if turn == 0 and np.isfinite(scene.limit):
+            opacity = extend_edge(opacity, scene.plateau)
         template = Template(opacity, top, left)
         if turn == PASSES - 1:
             break
@@ -69,6 +81,7 @@ def build_template(
                 start[1],
                 start[2],
                 start[3],
+                ceiling=scene.limit,
             )
             renewed.append(None if fit is None else (fit.y, fit.x, fit.level, fit.brightness))
         spots = renewed
@@ -90,14 +103,14 @@ def _fill_nearest(values: FloatArray, known: np.ndarray) -> FloatArray:
 
 
 def find_tip_point(
-    template: Template, lower: bool = True, clipped: bool = False
+    template: Template, lower: bool = True, known_above: float = -np.inf
 ) -> tuple[float, float, float, float, float] | None:
     """Circle through the round end of a template: centre row and column from the origin, radius, blur, misfit (rms).
 
     The opacity across a blurred edge is an error function of the distance from the circle; an edge that curves with
     radius R looks p²/(2R) too small when it is blurred by p, which is put right. Pixels within 60° of the end count.
-    Under a saturated background (``clipped``) only what is darker counts, and how bright the background would have been
-    is fitted with the rest. None where the end is not round.
+    Under a saturated background only what is darker was recorded (opacity ``known_above``) and counts. None where the end
+    is not round.
     """
     m = template.opacity if lower else template.opacity[::-1]
     h, w = m.shape
@@ -121,15 +134,14 @@ def find_tip_point(
         distance = np.hypot(yy - q[0], xx - q[1])
         angle = np.abs(np.arctan2(xx - q[1], yy - q[0]))
         near = (angle < np.pi / 3) & (np.abs(distance - q[2]) < 7.0)
-        if clipped:
-            near &= m > CLIPPED_BELOW
+        near &= m > known_above
         if near.sum() < 40:
             return None
         found = least_squares(
             residual,
             q,
             bounds=(
-                [-np.inf, -np.inf, 2.0, 0.2, -2.0 if clipped else -0.5, 0.5],
+                [-np.inf, -np.inf, 2.0, 0.2, -0.5, 0.5],
                 [np.inf, np.inf, 10 * w, 8.0, 0.5, 1.5],
             ),
             x_scale=[1, 1, 1, 0.3, 0.1, 0.1],
@@ -228,8 +240,12 @@ def fit_edge(
     x: float,
     level: float,
     brightness: float,
+    ceiling: float = np.inf,
 ) -> tuple[float, float] | None:
-    """Second, independent estimate: erf edge fitted to the top's middle columns. Returns the origin's row and sigma."""
+    """Second, independent estimate: erf edge fitted to the top's middle columns. Returns the origin's row and sigma.
+
+    Pixels at the ``ceiling`` do not count.
+    """
     offset, slope, blur, first, last = edge
     c0, c1 = int(np.ceil(x + first)), int(np.floor(x + last))
     centre = y + offset
@@ -239,7 +255,8 @@ def fit_edge(
     part = (slice(r0, r1), slice(c0, c1 + 1))
     if not usable[part].any():
         return None
-    image, ground, mask = picture[part].astype(float), background[part], usable[part].astype(float)
+    image, ground = picture[part].astype(float), background[part]
+    mask = (usable[part] & (image < ceiling - 0.5)).astype(float)
     yy = np.arange(r0, r1)[:, None] - slope * (np.arange(c0, c1 + 1)[None, :] - (x + 0.5 * (first + last)))
     q = np.array([centre, brightness, level])
     weight = mask / np.where(

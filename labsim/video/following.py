@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..records import FloatArray
+from .clipping import ABOVE_PLATEAU, measure_excess
 from .ends import View, build_template
 from .frames import Frames
 from .outline import Outline, choose_spread
-from .registration import MARGIN, Template, register
-from .scene import Scene
+from .registration import Fit, register
+from .scene import NEAR_CEILING, Scene
+from .template import MARGIN, Template
 
 TEMPLATE_FRAMES = 40
+RESTORATIONS = 6
 Progress = Callable[[int, int, str], None]
 
 
@@ -27,6 +30,17 @@ class EndTrack:
     sigma: FloatArray
     reason: list[str]
     template: Template
+    fits: tuple[Fit | None, ...] = ()
+
+
+@dataclass(frozen=True)
+class EndStart:
+    """Where one end roughly is in every frame ((n,) px), the lowest row at which it counts, and its template."""
+
+    y: FloatArray
+    x: FloatArray
+    floor: float
+    template: Template
 
 
 def follow_end(
@@ -38,8 +52,19 @@ def follow_end(
     progress: Progress | None,
 ) -> EndTrack | None:
     """Build the template of one end and register it in every frame; None where the end is never seen well."""
+    start = start_end(frames, scene, usable, outlines, which)
+    return None if start is None else _register_all(frames, scene, usable, start, which, progress)
+
+
+def start_end(
+    frames: Frames,
+    scene: Scene,
+    usable: np.ndarray,
+    outlines: tuple[list[Outline | None], float, float],
+    which: str,
+) -> EndStart | None:
+    """The template of one end, from frames in which it stands free; None where there are too few."""
     found, width, tip_width = outlines
-    count = len(found)
     y = np.array([np.nan if o is None or getattr(o, which) is None else getattr(o, which) for o in found])
     x = np.array([np.nan if o is None else getattr(o, f"column_{which}") for o in found])
     if which == "top":
@@ -67,25 +92,48 @@ def follow_end(
         if i in chosen
     ]
     template = build_template(views, scene, usable, top, left, shape)
-    if template is None:
-        return None
-    return _register_all(frames, scene, usable, template, y, x, which, floor, progress, count)
+    return None if template is None else EndStart(y, x, floor, template)
+
+
+def restore_light(
+    frames: Frames, scene: Scene, usable: np.ndarray, outlines: tuple[list[Outline | None], float, float]
+) -> Scene:
+    """The scene with the light that a saturated background would have had; unchanged where no edge says it.
+
+    The first template is made of clipped edges, which a spline cannot follow; each next one is made with the light that
+    the one before told, and tells it better.
+    """
+    clipped = scene.background >= NEAR_CEILING * scene.ceiling
+    restored, full = scene, scene.ceiling
+    for _ in range(RESTORATIONS):
+        known = 0.25 if restored is scene else restored.plateau + ABOVE_PLATEAU
+        starts = [start_end(frames, restored, usable, outlines, which) for which in ("tip", "top")]
+        told = [measure_excess(start.template.opacity, known) for start in starts if start is not None]
+        known_excess = [each for each in told if each is not None]
+        if not known_excess:
+            break
+        excess = float(np.mean(known_excess))
+        full -= excess * (full - scene.projectile_level)
+        full = float(np.clip(full, 1.005 * scene.ceiling, 3.0 * scene.ceiling))
+        restored = replace(scene, background=np.where(clipped, full, scene.background), limit=scene.ceiling)
+        if abs(excess) < 2e-3:
+            break
+    return restored
 
 
 def _register_all(
     frames: Frames,
     scene: Scene,
     usable: np.ndarray,
-    template: Template,
-    y: FloatArray,
-    x: FloatArray,
+    start: EndStart,
     which: str,
-    floor: float,
     progress: Progress | None,
-    count: int,
 ) -> EndTrack:
+    y, x, template = start.y, start.x, start.template
+    count = len(y)
     rows, columns, sigma = (np.full(count, np.nan) for _ in range(3))
     reason = [""] * count
+    fits: list[Fit | None] = [None] * count
     chi = np.full(count, np.nan)
     lost = np.full(count, np.nan)
     shift_y = shift_x = 0.0
@@ -99,23 +147,24 @@ def _register_all(
         if not np.isfinite(y[i]):
             reason[i] = "top end out of view" if which == "top" else "tip in the dust or out of view"
             continue
-        start = (y[i] + shift_y, x[i] + shift_x)
         fit = register(
             picture,
             scene.background,
             usable,
             template,
             scene.noise,
-            *start,
+            y[i] + shift_y,
+            x[i] + shift_x,
             level=scene.projectile_level * scene.brightness[i],
             brightness=float(scene.brightness[i]),
+            ceiling=scene.limit,
         )
         if fit is None:
             reason[i] = f"{which} end cannot be registered"
             continue
         rows[i], columns[i], sigma[i] = fit.y, fit.x, fit.sigma
         chi[i], lost[i] = fit.chi_square, fit.lost
-        last = fit
+        last = fits[i] = fit
         if abs(fit.y - y[i]) < 2 and abs(fit.x - x[i]) < 3:
             shift_y += 0.2 * (fit.y - y[i] - shift_y)
             shift_x += 0.2 * (fit.x - x[i] - shift_x)
@@ -130,7 +179,8 @@ def _register_all(
             reason[i] = f"{which} end disturbed (spray, glare?)"
     bad = np.array([bool(r) for r in reason])
     rows[bad], columns[bad], sigma[bad] = np.nan, np.nan, np.nan
-    return EndTrack(rows, columns, sigma * max(1.0, np.sqrt(typical)), reason, template)
+    kept = tuple(None if lost else fit for fit, lost in zip(fits, bad, strict=True))
+    return EndTrack(rows, columns, sigma * max(1.0, np.sqrt(typical)), reason, template, kept)
 
 
 def follow_entering(
@@ -159,6 +209,7 @@ def follow_entering(
             float(top.x[i] + side),
             level=scene.projectile_level * float(scene.brightness[i]),
             brightness=float(scene.brightness[i]),
+            ceiling=scene.limit,
         )
         if fit is None or not fit.sigma < 8 * usual or fit.lost > 0.2:
             continue

@@ -81,6 +81,7 @@ def compare_with_edge(
                 float(top.x[i]),
                 scene.projectile_level * float(scene.brightness[i]),
                 float(scene.brightness[i]),
+                scene.limit,
             )
             if second is not None:
                 difference[i], error[i] = second[0] - top.y[i], np.hypot(second[1], top.sigma[i])

@@ -8,13 +8,15 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured
+from .clipping import ABOVE_PLATEAU
 from .ends import find_edge, find_tip_point, measure_shaft
-from .following import Progress, follow_end, follow_entering
+from .following import EndTrack, Progress, follow_end, follow_entering, restore_light
 from .frames import Frames
 from .joining import clip_gap, compare_with_edge, join_ends, raise_to_scatter
+from .lossy import measure_widening
 from .outline import Outline
-from .registration import MARGIN
 from .scene import Scene
+from .template import MARGIN
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ def follow_rod(
     Raises MeasurementError where the tip is never seen free.
     """
     count = len(scene.brightness)
+    if clipped:
+        scene = restore_light(frames, scene, usable, outlines)
     top = follow_end(frames, scene, usable, outlines, "top", progress)
     tip = follow_end(frames, scene, usable, outlines, "tip", progress)
     if tip is None:
@@ -60,7 +64,11 @@ def follow_rod(
             "video",
             "the tip is never seen free of the dust and the picture's edge; frame it wider",
         )
-    round_end = find_tip_point(tip.template, clipped=clipped)
+    if frames.lossy:
+        top, tip = (_widen(frames, scene, usable, end, warnings) for end in (top, tip))
+        assert tip is not None
+    known_above = scene.plateau + ABOVE_PLATEAU if np.isfinite(scene.limit) else -np.inf
+    round_end = find_tip_point(tip.template, known_above=known_above)
     if round_end is None:
         rows = np.flatnonzero((tip.template.opacity > 0.5).sum(axis=1) > 0.3 * outlines[1])
         warnings.append("the tip is not round: its lowest half-dark row is taken")
@@ -123,3 +131,13 @@ def follow_rod(
     else:
         warnings.append("the top end is never in view: only frames with a free tip have a position")
     return Positions(row, sigma, x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)
+
+
+def _widen(
+    frames: Frames, scene: Scene, usable: np.ndarray, end: EndTrack | None, warnings: list[str]
+) -> EndTrack | None:
+    """The track of one end with the error bars that a compressed video allows."""
+    if end is None:
+        return None
+    factor = measure_widening(frames, scene, usable, end)
+    return replace(end, sigma=factor * end.sigma)

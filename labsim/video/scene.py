@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,22 +11,13 @@ import numpy as np
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured
 from .frames import Frames
+from .noise import Noise, measure_noise
 
+NEAR_CEILING = 0.99  # of the ceiling: a mean that high holds clipped pixels
 LEAST_CONTRAST = 4.0  # times the noise; below, every method fails (Cheezum et al. 2001)
 SPARSE = 4096  # pixels that stand for the picture where brightness and noise are followed in time
 NOISE_FRAMES = 600
 ROUGHEST_SURFACE = 3.0  # px rms about a straight line; beyond, it is a carpet or a picture, not raked dust
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Variance of a pixel = read² + gain · level, in grey levels; both include quantisation."""
-
-    read_variance: float
-    gain: float
-
-    def variance(self, level: FloatArray) -> FloatArray:
-        return np.maximum(self.read_variance + self.gain * np.maximum(level, 0.0), 1.0 / 12.0)
 
 
 @dataclass(frozen=True)
@@ -38,7 +28,8 @@ class Scene:
     trusted : pixels that are neither dead nor saturated; swept : pixels that the projectile passed over;
     corridor : first and last column of the projectile's path;
     brightness : (n,) of each frame; duplicate : (n,) whether a frame repeats the one before, bit by bit;
-    surface : row of the dust's surface along a column x: rows = surface[0] + surface[1] · x, None where none is seen.
+    surface : row of the dust's surface along a column x: rows = surface[0] + surface[1] · x, None where none is seen;
+    limit : the ceiling where the background is the light without it, else infinite.
     """
 
     background: FloatArray
@@ -53,6 +44,13 @@ class Scene:
     surface: tuple[float, float] | None
     surface_sigma: float
     ceiling: float
+    limit: float = np.inf
+
+    @property
+    def plateau(self) -> float:
+        """Opacity at which clipped pixels stand."""
+        full = float(np.max(self.background))
+        return (full - self.ceiling) / (full - self.projectile_level)
 
     def surface_row(self, column: float) -> Measured | None:
         if self.surface is None:
@@ -89,7 +87,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
             path, "video", f"only {len(brightness)} frames can be read; a drop needs at least 12"
         )
     brightness_array = np.array(brightness)
-    noise = _measure_noise(np.array(sparse))
+    noise = measure_noise(np.array(sparse), float((1 << frames.bits) - 1))
     span = high - low
     floor = float(np.median(span))
     threshold = max(_otsu(span), floor + 3.0)
@@ -156,41 +154,6 @@ def _otsu(values: FloatArray) -> float:
     top = float(np.percentile(values, 99.9))
     scaled = np.clip(values / max(top, 1e-6) * 255.0, 0, 255).astype(np.uint8)
     return cv2.threshold(scaled, 0, 255, cv2.THRESH_OTSU)[0] / 255.0 * top
-
-
-def _measure_noise(sparse: FloatArray) -> Noise:
-    """Mean-variance line from the differences of neighbouring frames; medians, so that what moves does not count."""
-    n = len(sparse)
-    difference = np.diff(sparse, axis=0).reshape(n - 1, -1)
-    level = 0.5 * (sparse[1:] + sparse[:-1]).reshape(n - 1, -1)
-    still = ~np.all(difference == 0, axis=1)  # repeated frames say nothing
-    difference, level = difference[still], level[still]
-    if len(difference) < 4:
-        return Noise(1.0 / 12.0, 0.0)
-    # per pixel: clipped mean square, since medians of whole numbers are coarse
-    centre = np.median(difference, axis=0)
-    spread = np.maximum(1.4826 * np.median(np.abs(difference - centre), axis=0), 0.75)
-    inside = np.abs(difference - centre) < 4.0 * spread
-    square = np.sum(np.where(inside, (difference - centre) ** 2, 0.0), axis=0) / np.maximum(
-        inside.sum(axis=0), 1
-    )
-    variance = 0.5 * square
-    mean = np.median(level, axis=0)
-    edges = np.quantile(mean, np.linspace(0, 1, 13))
-    points = []
-    for a, b in itertools.pairwise(edges):
-        inside_bin = (mean >= a) & (mean <= b)
-        if inside_bin.sum() >= 20 and b > a:
-            points.append((np.mean(mean[inside_bin]), np.median(variance[inside_bin])))
-    if len(points) < 3 or np.ptp([p[0] for p in points]) < 5:
-        return Noise(max(float(np.median(variance)), 1.0 / 12.0), 0.0)
-    x, y = np.array(points).T
-    gain, read = np.polyfit(x, y, 1, w=1.0 / np.maximum(y, 1.0 / 12.0))
-    if gain < 0 or read < 0:
-        gain, read = (
-            (0.0, float(np.median(y))) if gain < 0 else (float(np.sum(x * y) / np.sum(x * x)), 1.0 / 12.0)
-        )
-    return Noise(float(max(read, 1.0 / 12.0)), float(gain))
 
 
 def _average_background(

@@ -20,7 +20,7 @@ from .gaps import find_gaps
 from .joining import raise_to_scatter
 from .outline import Outline, Outliner
 from .rod import Positions, follow_rod
-from .scene import Scene, survey_scene
+from .scene import NEAR_CEILING, Scene, survey_scene
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def follow_projectile(
     outlines = _outline_all(frames, scene, progress)
     usable = _usable_pixels(scene)
     warnings = list(frames.warnings)
-    full = scene.background >= 0.99 * scene.ceiling
+    full = scene.background >= NEAR_CEILING * scene.ceiling
     clipped = bool(np.mean(full[usable]) > 0.02)
     if clipped:
         warnings.append(

@@ -1,0 +1,88 @@
+"""What the pixels around one end say of its place: score and Fisher matrix of one Gauss-Newton step, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def weigh_pixel(value: float, model: float, variance: float, ceiling: float) -> tuple[float, float, float]:
+    """Score times the standard deviation, information and expected square (both in units of 1/variance) of one pixel.
+
+    A pixel at the ``ceiling`` says only that the light was at least that bright (a censored normal: Tobin 1958). One that
+    is expected far above it says nothing, one far below it is an ordinary pixel.
+    """
+    deviation = math.sqrt(variance)
+    limit = ceiling - 0.5
+    z = (limit - model) / deviation
+    if z > 8.0:
+        return (value - model) / deviation, 1.0, 1.0
+    if z < -8.0:
+        return 0.0 if value >= limit else (value - model) / deviation, 0.0, 0.0
+    density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
+    below = (1.0 - beyond) - z * density  # mean square of the pixels that are not clipped, times their share
+    information = below + density * density / max(beyond, 1e-300)
+    if value >= limit:
+        return density / max(beyond, 1e-300), information, below
+    return (value - model) / deviation, information, below
+
+
+@njit(cache=True)
+def accumulate(  # type: ignore[no-untyped-def]
+    c, wy, gy, wx, gx, row0, column0, h, w, image, ground, mask, theta, read_variance, gain, huber, ceiling
+):  # pragma: no cover - compiled
+    """Normal equations of one Gauss-Newton step: Fisher matrix (6, 6), right side (6,), and (χ², information kept,
+    information at hand, expected χ²). One pass over the pixels; the template's spline is evaluated on the way."""
+    fisher, right, sums, slope = np.zeros((6, 6)), np.zeros(6), np.zeros(4), np.zeros(6)
+    along, steep = np.empty(image.shape[1] + 4), np.empty(image.shape[1] + 4)
+    clipped = ceiling < 1e30
+    for i in range(image.shape[0]):
+        down = 2.0 * (row0 + i) / (h - 1) - 1.0
+        for j in range(image.shape[1] + 4):
+            value = tilt = 0.0
+            for k in range(5):
+                coefficient = c[row0 + i + k + 1, column0 + j + 1]
+                value += wy[k] * coefficient
+                tilt += gy[k] * coefficient
+            along[j], steep[j] = value, tilt
+        for j in range(image.shape[1]):
+            if mask[i, j] == 0.0:
+                continue
+            m = my = mx = 0.0
+            for k in range(5):
+                m += wx[k] * along[j + k]
+                mx += gx[k] * along[j + k]
+                my += wx[k] * steep[j + k]
+            across = 2.0 * (column0 + j) / (w - 1) - 1.0
+            model = theta[2] * ground[i, j] * (1.0 - m) + theta[3] * m
+            light = model + theta[4] * down + theta[5] * across
+            variance = max(read_variance + gain * max(model, 0.0), 1.0 / 12.0)
+            residual, information, expected = (image[i, j] - light) / math.sqrt(variance), 1.0, 1.0
+            if clipped:
+                residual, information, expected = weigh_pixel(image[i, j], light, variance, ceiling)
+            trust = 1.0
+            size = abs(residual)
+            if size > huber:
+                trust = huber / size
+            weight = trust * information / variance
+            score = trust * residual / math.sqrt(variance)
+            lever = theta[3] - theta[2] * ground[i, j]
+            slope[0], slope[1], slope[2] = lever * my, lever * mx, ground[i, j] * (1.0 - m)
+            slope[3], slope[4], slope[5] = m, down, across
+            for p in range(6):
+                right[p] += score * slope[p]
+                for q in range(p, 6):
+                    fisher[p, q] += weight * slope[p] * slope[q]
+            if not clipped or image[i, j] < ceiling - 0.5:
+                sums[0] += trust * residual**2
+            sums[1] += weight * slope[0] ** 2
+            sums[2] += weight / trust * slope[0] ** 2
+            sums[3] += expected
+    for p in range(6):
+        for q in range(p):
+            fisher[p, q] = fisher[q, p]
+    return fisher, right, sums
