@@ -1,6 +1,8 @@
 """A simulated dust seen through a scan's own cells, point spread and mask: what is compared with the scan.
 
-Mass is conserved: every particle's mass lands in the cells in full (but for what leaves the map's frame).
+Mass is conserved: every particle's mass lands in the cells in full (but for what leaves the map's frame). Where dust fills a cell
+it may be divided by the volume of the particles there instead: particles carry their filling factor to 1e-4, while the gaps and
+overlaps of squares on a strained lattice make 2e-3 of noise in what they add up to.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from scipy.special import ive
 from ..records import FillingMap, FloatArray
 
 FINE = 2  # fine bins along an edge of a cell
+LEAST_FILLED = 0.01  # of a cell, mixed in at the undisturbed mean: a cell without particles has no average
 
 
 def project(
@@ -27,6 +30,7 @@ def project(
     shift: float = 0.0,
     geometry: str = "ring",
     masked: np.ndarray | None = None,
+    of_particles: bool = False,
 ) -> FloatArray:
     """Filling factor of a set of SPH particles on the cells of a scan's map, (nz, nr), NaN where the map is masked.
 
@@ -35,7 +39,8 @@ def project(
     turned about the axis as if it were round).
     blur : m, standard deviation of the point spread in three dimensions. scale : factor on the filling factor that the
     scan reads (a wrong grey calibration). shift : m, the dust moved upwards against the scan.
-    masked : (nz, nr) bool, default the NaN cells of the map. A particle is a square of its own area, so a lattice of
+    masked : (nz, nr) bool, default the NaN cells of the map. of_particles : the mean over the particles in a cell, not over the
+    cell: for cells that dust fills. A particle is a square of its own area, so a lattice of
     particles gives a smooth map. Below 5 ms for 10^4 particles once a blur was used before.
     """
     edges_r, edges_z = _fine_edges(scan_map)
@@ -47,7 +52,21 @@ def project(
     half = 0.5 * np.sqrt(area)
     half_r = np.minimum(half, np.maximum(r, 1e-9))
     half_z = area / (4 * half_r)
-    deposit = _deposit(r - half_r, r + half_r, z - half_z, z + half_z, mass, edges_r, edges_z)
+    sides = (r - half_r, r + half_r, z - half_z, z + half_z)
+    seen = _see(_deposit(*sides, mass, edges_r, edges_z), edges_r, edges_z, blur, scan_map)
+    if of_particles:
+        filled = _see(_deposit(*sides, mass / phi, edges_r, edges_z), edges_r, edges_z, blur, scan_map)
+        mean = float(mass.sum() / (mass / phi).sum())
+        seen = (seen + LEAST_FILLED * mean) / (filled + LEAST_FILLED)
+    seen = scale * seen
+    hidden = ~np.isfinite(scan_map.filling_factor) if masked is None else masked
+    return np.where(hidden, np.nan, seen)
+
+
+def _see(
+    deposit: FloatArray, edges_r: FloatArray, edges_z: FloatArray, blur: float, scan_map: FillingMap
+) -> FloatArray:
+    """What was laid into the fine bins, per volume of the map's cells, (nz, nr), through the point spread."""
     if blur > 0:
         across, along = _blur_matrices(
             float(edges_r[1] - edges_r[0]),
@@ -62,9 +81,7 @@ def project(
     inner = deposit[pad_z : pad_z + nz * FINE, : nr * FINE]
     cells = inner.reshape(nz, FINE, nr, FINE).sum((1, 3))[::-1]
     dr, dz = _steps(scan_map)
-    seen = scale * cells / (2 * np.pi * scan_map.r * dr * dz)
-    hidden = ~np.isfinite(scan_map.filling_factor) if masked is None else masked
-    return np.where(hidden, np.nan, seen)
+    return np.asarray(cells / (2 * np.pi * scan_map.r * dr * dz))
 
 
 def _steps(scan_map: FillingMap) -> tuple[float, float]:

@@ -30,8 +30,6 @@ NUMERICAL_DEPTH = 0.03  # of the depth: slow, shallow drops differ by up to 4 % 
 # beside the tip, and the overshoot of a compaction front, which is alike over the whole zone
 NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
-# of the variance of a map: with 1, maps of an independent simulator's nominal dust ask for another shear strength (4.5 σ)
-INFLATION = 6.0
 STRENGTH = 0.15  # of ln p_m by which the zones of two codes differ, most under shallow drops
 CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
 
@@ -84,6 +82,7 @@ def encode_scan_run(run: DropRun, observed: ObservedScan) -> FloatArray:
         blur=reduced.point_spread,
         shift=run.penetration_depth - reduced.map.tip_depth,
         masked=~observed.cells,
+        of_particles=True,
     )
     return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
 
@@ -133,7 +132,6 @@ def linearise_scan(
     for share, length in NUMERICAL:
         error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
         covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2 / length**2)
-    covariance *= INFLATION
     covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
     speed = observed.scan.speed
     spread = speed.sigma / speed.value

@@ -92,3 +92,27 @@ def test_coarser_cells_keep_the_mass():
     coarse = coarsen(m, 2)
     cells = [(x.filling_factor * x.r).sum() * k * k for x, k in ((m, 1), (coarse, 2))]
     assert cells[1] == pytest.approx(cells[0], rel=1e-9)
+
+
+def test_the_mean_over_particles_is_free_of_their_gaps():
+    """A shaken lattice of compacted dust: the mean over particles gives the field, the sum over cells its gaps too."""
+    rng = np.random.default_rng(1)
+    r, z, h = lattice(width=2.2e-3)
+    phi = 0.15 + 0.06 * np.exp(-((r / 0.6e-3) ** 2) - ((z + 1.5e-3) / 0.4e-3) ** 2)
+    volume = 2 * np.pi * r * h * h
+    r, z = np.abs(r + 0.25 * h * rng.uniform(-1, 1, r.size)), z + 0.25 * h * rng.uniform(-1, 1, r.size)
+    m = empty_map()
+    truth = 0.15 + 0.06 * np.exp(-((m.r[None, :] / 0.6e-3) ** 2) - ((m.z[:, None] + 1.5e-3) / 0.4e-3) ** 2)
+    dust = (m.z[:, None] < -0.4e-3) & (m.z[:, None] > -3.0e-3) & (m.r < 1.2e-3)
+    noise = {
+        each: float(np.std((project(r, z, volume, phi, m, blur=40e-6, of_particles=each) - truth)[dust]))
+        for each in (False, True)
+    }
+    assert noise[True] < 0.3 * noise[False] and noise[True] < 1.5e-3
+
+
+def test_cells_without_particles_have_no_average():
+    r, z, h = lattice()
+    m = empty_map()
+    seen = project(r, z, 2 * np.pi * r * h * h, np.full(r.size, 0.15), m, blur=40e-6, of_particles=True)
+    assert seen == pytest.approx(0.15, abs=1e-9)  # the mean of all dust, and nowhere a division by nothing
