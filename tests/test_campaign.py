@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from campaign_files import CAMPAIGN, DROP, SCAN
 
 from labsim.campaign import describe_campaign, read_campaign, read_drop, read_scan
 from labsim.cli import main
@@ -17,66 +18,6 @@ from labsim.records import PublishedScan, Scan
 
 SEED = Path(__file__).parent.parent / "data" / "guettler2009"
 
-CAMPAIGN = """format = 1
-name = "t"
-description = "a test"
-[sample]
-filling_factor = 0.15
-filling_factor_sigma = 0.001
-monomer_density_kg_m3 = 2000.0
-diameter_mm = 25.0
-depth_mm = 20.0
-gas_pressure_Pa = 10.0
-[material]
-p_m_range_Pa = [300.0, 6000.0]
-phi_1 = 0.12
-phi_2 = 0.58
-delta = 0.58
-tensile_log10_a = 2.8
-tensile_log10_b = 1.48
-shear_factor = 1.0
-bulk_modulus_Pa = 45000.0
-bulk_exponent = 4.0
-shear_to_bulk = 0.5
-contact_friction = 0.0
-"""
-DROP = """[projectile]
-tip = "hemisphere"
-tip_radius_mm = 0.500
-length_mm = 4.00
-mass_mg = 1.3299
-mass_sigma_mg = 0.0066
-[drop]
-sequence = 3
-height_mm = 0.98
-height_sigma_mm = 0.15
-[camera]
-frame_rate_Hz = 10000.0
-pixel_size_um = 20.00
-surface_row_px = 296.15
-surface_row_sigma_px = 0.15
-[record]
-file = "track.csv"
-kind = "track"
-row_sigma_px = 0.08
-"""
-SCAN = """[projectile]
-shape = "sphere"
-radius_mm = 0.500
-mass_mg = 1.3299
-[drop]
-speed_m_s = 0.777
-speed_sigma_m_s = 0.039
-[scan]
-slices = "slices"
-voxel_um = 40.0
-first_slice = "top"
-bits = 8
-[calibration]
-grey_air = 12.0
-grey_per_density = 0.16
-density_solid_kg_m3 = 2000.0
-"""
 TRACK = "frame,tip_row_px\n" + "".join(f"{i},{250 + 2 * i}\n" for i in range(40))
 
 

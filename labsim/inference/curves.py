@@ -7,9 +7,6 @@ polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/inference.md g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -38,45 +35,3 @@ def decode_rate(code: FloatArray, time: FloatArray) -> FloatArray:
     spline = CubicSpline(FRACTIONS, code[2:])
     inside = time / stop <= FRACTIONS[-1]
     return np.where(inside, depth / stop * spline(np.clip(time / stop, 0.0, FRACTIONS[-1]), 1), 0.0)
-
-
-@dataclass(frozen=True)
-class CodePolynomial:
-    """Interpolating polynomial (Newton form) of codes in one variable.
-
-    nodes : (k,); values : (k, m). Degree k - 1, exact at the nodes.
-    """
-
-    nodes: FloatArray
-    values: FloatArray
-
-    def __post_init__(self) -> None:
-        table = np.array(self.values, dtype=float)
-        for order in range(1, len(self.nodes)):
-            step = (self.nodes[order:] - self.nodes[:-order])[:, None]
-            table[order:] = (table[order:] - table[order - 1 : -1]) / step
-        object.__setattr__(self, "_differences", table)
-
-    def __call__(self, x: float) -> FloatArray:
-        differences: FloatArray = self._differences  # type: ignore[attr-defined]
-        result = differences[-1].copy()
-        for k in range(len(self.nodes) - 2, -1, -1):
-            result = result * (x - self.nodes[k]) + differences[k]
-        return result
-
-    def leave_one_out(self) -> FloatArray:
-        """(k,) differences in ln D between each inner node and the polynomial through the others; NaN at the ends."""
-        errors = np.full(len(self.nodes), np.nan)
-        for k in range(1, len(self.nodes) - 1):
-            keep = np.arange(len(self.nodes)) != k
-            rest = CodePolynomial(self.nodes[keep], self.values[keep])
-            errors[k] = rest(self.nodes[k])[0] - self.values[k, 0]
-        return errors
-
-
-def interpolate_codes(positions: Sequence[float], runs: Sequence[DropRun]) -> CodePolynomial:
-    """The polynomial through runs at distinct positions (any order)."""
-    order = np.argsort(positions)
-    return CodePolynomial(
-        np.asarray(positions, dtype=float)[order], np.array([encode_run(runs[k]) for k in order])
-    )

@@ -9,8 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # for attempts and small_campaign
 from small_campaign import ROOT, copy_campaign
 
 Begin = Callable[..., "subprocess.Popen[str]"]

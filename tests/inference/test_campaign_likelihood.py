@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labsim.inference.curves import FRACTIONS, CodePolynomial, decode_depth, decode_rate, encode_run
+from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.likelihood import solve_globals
@@ -20,13 +20,6 @@ from labsim.sph import DropSetting, simulate
 def sine_code(depth=1e-3, stop=2e-3):
     shape = np.sin(0.5 * math.pi * np.minimum(FRACTIONS, 1.0))
     return np.concatenate([[math.log(depth), math.log(stop)], shape])
-
-
-def test_polynomial_is_exact_for_cubics():
-    nodes = np.array([-1.0, 0.0, 0.7, 2.0])
-    cubic = CodePolynomial(nodes, np.stack([nodes**3 - nodes, 2 * nodes**2], axis=1))
-    assert cubic(1.3) == pytest.approx([1.3**3 - 1.3, 2 * 1.3**2], rel=1e-12)
-    assert np.isnan(cubic.leave_one_out()[[0, -1]]).all()
 
 
 def test_weights_sum_to_one_and_reproduce_polynomials():

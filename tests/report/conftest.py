@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import os
 import shutil
-import sys
 from pathlib import Path
 
+import laws
 import pytest
 
 from labsim.campaign import read_campaign
 from labsim.cli.diagnose import write_diagnosis
 from labsim.cli.measured import write_measured_calibration, write_measured_diagnosis
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
-from labsim.diagnosis.judge import Verdict
 from labsim.diagnosis.summary import diagnose_summary
 from labsim.inference.calibrate import calibrate
 from labsim.inference.summary import calibrate_summary
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"
 HOSTILE = "<script>document.title='ran'</script>"
-
-spec = importlib.util.spec_from_file_location("laws", Path(__file__).with_name("laws.py"))
-assert spec is not None and spec.loader is not None
-laws = importlib.util.module_from_spec(spec)
-sys.modules["laws"] = laws
-spec.loader.exec_module(laws)
 
 
 @pytest.fixture(scope="session")
@@ -55,18 +47,10 @@ def effect(effect_found: Diagnosis, place: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def none(effect_found: Diagnosis, place: Path) -> Path:
-    """The same drops, written down as a diagnosis that found nothing writes them: one model, no gain."""
-    found = dataclasses.replace(
-        effect_found,
-        best=effect_found.nominal,
-        verdict=Verdict("none", [(("none",), 0.97), (("unknown",), 0.03)]),
-        posterior_extended=effect_found.posterior_nominal,
-        held_out_extended=effect_found.held_out_nominal,
-        confusable=[],
-        p_value=0.6,
-    )
-    return write(found, place / "none")
+def none(place: Path) -> Path:
+    """Drops that obey the very law that the runs obey: one model, no gain."""
+    campaign = read_campaign(laws.write_campaign(place / "campaign-none"))
+    return write(diagnose_campaign(campaign, laws.LawStore(place / "store"), workers=1), place / "none")
 
 
 @pytest.fixture(scope="session")
@@ -125,8 +109,3 @@ def browser():
 
 def load(folder: Path, name: str) -> dict:
     return json.loads((folder / name).read_text())
-
-
-@pytest.fixture(scope="session", name="laws")
-def give_laws():
-    return laws

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 
+import laws
 import numpy as np
 import pytest
 
@@ -16,7 +17,7 @@ from labsim.errors import EffectError
 from labsim.inference.calibrate import calibrate, integrate_evidence
 
 
-def test_a_single_drop_is_diagnosed_without_holding_any_out(place, laws):
+def test_a_single_drop_is_diagnosed_without_holding_any_out(place):
     campaign = read_campaign(laws.write_campaign(place / "campaign-single", drops=laws.DROPS[2:3]))
     found = diagnose_campaign(campaign, laws.LawStore(place / "store"), workers=1)
     folder = place / "single"
@@ -28,7 +29,7 @@ def test_a_single_drop_is_diagnosed_without_holding_any_out(place, laws):
     assert "nan" not in lines.splitlines()[0]
 
 
-def test_a_drop_that_shows_nothing_is_left_out_and_said(place, laws):
+def test_a_drop_that_shows_nothing_is_left_out_and_said(place):
     folder = laws.write_campaign(place / "campaign-empty-drop")
     track = folder / "drops" / "D02" / "track.csv"
     head, *rows = track.read_text().splitlines()
@@ -41,7 +42,7 @@ def test_a_drop_that_shows_nothing_is_left_out_and_said(place, laws):
 RATE = Model(1300.0, (("strength_rate", {"eta": 0.05, "n": 0.5}),))
 
 
-def test_an_extended_model_is_part_of_the_simulation(place, laws):
+def test_an_extended_model_is_part_of_the_simulation(place):
     """The gain is there when the model is applied: p_m comes out true, and the data are explained."""
     campaign = read_campaign(laws.write_campaign(place / "campaign-model", rate=0.05))
     plain = calibrate(campaign, store=laws.LawStore(place / "store"))
@@ -53,14 +54,14 @@ def test_an_extended_model_is_part_of_the_simulation(place, laws):
     assert np.median(plain.posterior.samples("p_m_Pa")) > 1.5 * 1300.0
 
 
-def test_a_model_that_cannot_be_at_work_here_is_refused(place, laws):
+def test_a_model_that_cannot_be_at_work_here_is_refused(place):
     campaign = read_campaign(laws.write_campaign(place / "campaign-no-scan"))
     model = Model(1300.0, (("ct_scale", {"factor": 1.05}),))
     with pytest.raises(EffectError, match="does not apply here"):
         calibrate(campaign, store=laws.LawStore(place / "store"), model=model)
 
 
-def test_nested_sampling_agrees_with_the_formula_for_the_evidence(place, laws):
+def test_nested_sampling_agrees_with_the_formula_for_the_evidence(place):
     campaign = read_campaign(laws.write_campaign(place / "campaign-evidence", rate=0.05))
     found = calibrate(campaign, ("p_m", "strength_rate"), store=laws.LawStore(place / "store"))
     nested, error = integrate_evidence(found.bench, found.fit)

@@ -217,4 +217,3 @@ def test_inputs_are_hashed(effect: Path, effect_found) -> None:  # type: ignore[
 def test_a_figure_s_data_are_finite(effect: Path) -> None:
     data = Page(effect / "report.html").scripts[0]
     assert "NaN" not in data and "Infinity" not in data and "<" not in data
-

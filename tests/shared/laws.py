@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from campaign_files import CAMPAIGN, DROP, SCAN, fill_in
 
 from labsim.ct.phantom import Phantom
 from labsim.inference.runs import RunStore
@@ -98,59 +99,30 @@ def write_campaign(
     """rate: strength_rate of the truth. odd: relative change of the depth, up and down from drop to drop."""
     rng = np.random.default_rng(7)
     folder.mkdir(parents=True)
-    (folder / "campaign.toml").write_text(
-        f"""format = 1
-name = {name!r}
-description = {description!r}
-[sample]
-filling_factor = 0.15
-filling_factor_sigma = 0.001
-monomer_density_kg_m3 = 2000.0
-diameter_mm = 25.0
-depth_mm = 20.0
-gas_pressure_Pa = 10.0
-[material]
-p_m_range_Pa = [300.0, 6000.0]
-phi_1 = 0.12
-phi_2 = 0.58
-delta = 0.58
-tensile_log10_a = 2.8
-tensile_log10_b = 1.48
-shear_factor = 1.0
-bulk_modulus_Pa = 45000.0
-bulk_exponent = 4.0
-shear_to_bulk = 0.5
-contact_friction = 0.0
-"""
-    )
+    text = fill_in(CAMPAIGN, name=name, description=description)
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
     for number, (radius, mass, speed) in enumerate(drops, start=1):
         change = 1 + odd * (-1) ** number
         depth, stop = move(radius * 1e-3, mass * 1e-6, speed, 1300.0 / change**2, rate)
         at = folder / "drops" / f"D{number:02d}"
         at.mkdir(parents=True)
         height = speed**2 / 2 / 9.81
-        (at / "drop.toml").write_text(
-            f"""[projectile]
-tip = "hemisphere"
-tip_radius_mm = {radius}
-length_mm = 6.0
-mass_mg = {mass}
-mass_sigma_mg = {mass * 0.003}
-[drop]
-sequence = {number}
-height_mm = {height * 1e3:.4f}
-height_sigma_mm = 0.2
-[camera]
-frame_rate_Hz = {RATE}
-pixel_size_um = {PIXEL * 1e6}
-surface_row_px = {SURFACE}
-surface_row_sigma_px = 0.1
-[record]
-kind = "track"
-file = "track.csv"
-row_sigma_px = {NOISE}
-"""
+        text = fill_in(
+            DROP,
+            tip_radius_mm=radius,
+            length_mm=6.0,
+            mass_mg=mass,
+            mass_sigma_mg=mass * 0.003,
+            sequence=number,
+            height_mm=round(height * 1e3, 4),
+            height_sigma_mm=0.2,
+            frame_rate_Hz=RATE,
+            pixel_size_um=PIXEL * 1e6,
+            surface_row_px=SURFACE,
+            surface_row_sigma_px=0.1,
+            row_sigma_px=NOISE,
         )
+        (at / "drop.toml").write_text(text)
         frame = np.arange(int((0.004 + 1.6 * stop) * RATE))
         clock = frame / RATE - 0.00403
         inside = depth * np.sin(np.clip(clock / stop, 0, 1) * math.pi / 2)
@@ -169,22 +141,15 @@ def write_scan(folder: Path) -> None:
     phantom = Phantom(centre=(54.3, 50.6, depth / plain.voxel - plain.radius + plain.surface))
     scan = phantom.write(folder / "slices")
     grey = phantom.calibration
-    (folder / "scan.toml").write_text(
-        f"""[projectile]
-shape = "sphere"
-radius_mm = {scan.projectile.tip_radius * 1e3:.6f}
-mass_mg = {scan.projectile.mass * 1e6:.6f}
-[drop]
-speed_m_s = 0.8
-speed_sigma_m_s = 0.04
-[scan]
-slices = "slices"
-voxel_um = {phantom.voxel * 1e6:.3f}
-first_slice = "top"
-bits = {phantom.bits}
-[calibration]
-grey_air = {grey.grey_air}
-grey_per_density = {grey.grey_per_density}
-density_solid_kg_m3 = 2000.0
-"""
+    text = fill_in(
+        SCAN,
+        radius_mm=scan.projectile.tip_radius * 1e3,
+        mass_mg=scan.projectile.mass * 1e6,
+        speed_m_s=0.8,
+        speed_sigma_m_s=0.04,
+        voxel_um=phantom.voxel * 1e6,
+        bits=phantom.bits,
+        grey_air=grey.grey_air,
+        grey_per_density=grey.grey_per_density,
     )
+    (folder / "scan.toml").write_text(text)
