@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -263,9 +264,10 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         f"{campaign.sample.diameter * 1e3:g} mm wide, {campaign.sample.depth * 1e3:g} mm deep, "
         f"gas {campaign.sample.gas_pressure:g} Pa",
         f"  model: {campaign.geometry}, gravity {campaign.gravity:g} m/s², p_m between {low / 1e3:g} and {high / 1e3:g} kPa",
-        f"  {len(campaign.drops)} drops (" + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) + "), tip radii "
+        f"  {_count(campaign.drops, 'drop')} (" + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) + "), tip radii "
         + ", ".join(f"{r * 1e3:g} mm" for r in radii),
-        f"  {len(campaign.scans)} CT scans with slices, {len(campaign.published_scans)} published compaction figures",
+        f"  {_count(campaign.scans, 'CT scan')} with slices, "
+        f"{_count(campaign.published_scans, 'published compaction figure')}",
     ]  # fmt: skip
     if assumed:
         lines.append(
@@ -283,6 +285,10 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         "warnings": [],
         "text": "\n".join(lines),
     }
+
+
+def _count(things: Sequence[object], noun: str) -> str:
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
 
 
 def _read_sample(table: Table) -> Sample:

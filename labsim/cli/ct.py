@@ -1,4 +1,4 @@
-"""``labsim ct``: slices become the map of the filling factor and its compacted volume."""
+"""``labsim ct``: slices become a filling-factor map and its compacted volume."""
 
 from __future__ import annotations
 

@@ -11,10 +11,8 @@ import typer
 
 from ..campaign import read_campaign
 from ..effects import KINDS, Effect, Parameter, list_effects
+from ..report.phrases import shown_unit
 from . import options
-
-# factor to a unit that people see, by the unit in files
-SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm")}
 
 WIDE = 130  # columns that the table needs; a list below that, and into files
 KEY = (
@@ -76,7 +74,7 @@ def _list_narrow(known: dict[str, Effect], reasons: dict[str, str]) -> str:
             if effect.kind == kind:
                 lines.append(f"{name} ({kind}): {effect.title}")
                 for shown, unit, prior in map(_show, effect.parameters):
-                    lines.append(f"    {shown}, prior {prior}" + (f" {unit}" if unit != "1" else ""))
+                    lines.append(f"    {shown}" + (f" in {unit}" if unit else "") + f", prior {prior}")
                 if reasons[name]:
                     lines.append(f"    not here: {reasons[name]}")
                 lines += textwrap.wrap(
@@ -87,7 +85,7 @@ def _list_narrow(known: dict[str, Effect], reasons: dict[str, str]) -> str:
 
 def _show(parameter: Parameter) -> tuple[str, str, str]:
     """Symbol and name, the unit that people see, the prior in it."""
-    factor, unit = SHOWN.get(parameter.unit, (1.0, parameter.unit))
+    factor, unit = shown_unit(parameter)
     prior = parameter.prior
     scaled = type(prior)(
         **{

@@ -10,6 +10,7 @@ import typer
 
 from ..errors import InferenceError
 from ..inference.runs import RunStore
+from ..report.phrases import say_count
 from . import options
 
 
@@ -44,7 +45,7 @@ def runs(
         }
         options.finish(
             summary,
-            f"{opened.folder}: {total - len(damaged)} runs whole, {len(damaged)} damaged",
+            f"{opened.folder}: {say_count(total - len(damaged), 'run')} whole, {len(damaged)} damaged",
             as_json=as_json,
             quiet=quiet,
         )
@@ -58,7 +59,7 @@ def runs(
         left = len(opened.index())
         options.finish(
             {"store": opened.folder, "removed": removed, "runs": left},
-            f"{opened.folder}: {removed} files removed, {left} runs left",
+            f"{opened.folder}: {say_count(removed, 'file')} removed, {say_count(left, 'run')} left",
             as_json=as_json,
             quiet=quiet,
         )
@@ -72,6 +73,6 @@ def runs(
     ]
     if len(found) > len(lines):
         lines.append(f"... and {len(found) - len(lines)} more (--last 0 shows all)")
-    lines.append(f"{opened.folder}: {len(found)} runs, {size / 1e6:.1f} MB")
+    lines.append(f"{opened.folder}: {say_count(len(found), 'run')}, {size / 1e6:.1f} MB")
     summary = {"store": opened.folder, "runs": [entry.__dict__ for entry in found], "bytes": size}
     options.finish(summary, "\n".join(lines), as_json=as_json, quiet=quiet)

@@ -148,8 +148,8 @@ def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:
         f"{raw}depth {depth} mm, stopping time {stop} ms"
         + (f" (extrapolated from {len(runs)} spacings)" if len(runs) > 1 else ""),
         f"{run.particles.r.size} particles, {run.steps} steps, {run.wall:.1f} s, {run.updates_per_s / 1e6:.2f} million "
-        f"updates/s; momentum {run.momentum_error:.1e}, energy {run.energy_error:.1e}, artificial viscosity took "
-        f"{run.viscous_share:.1%} of the energy",
+        f"updates/s; momentum off by {abs(run.momentum_error):.0e}, energy by {run.energy_error:+.1%}; artificial viscosity "
+        f"took {run.viscous_share:.1%} of the energy",
         *(f"warning: {warning}" for warning in run.warnings),
     ]
     return summary, "\n".join(lines)

@@ -31,7 +31,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
         parameters = []
         for full, q in cause["parameters"].items():
             factor, unit = SHOWN.get(q["unit"], (1.0, q["unit"]))
-            middle, low, high = (show_number(q[key] * factor, "{:.4g}") for key in ("q50", "q05", "q95"))
+            middle, low, high = (show_number(q[key] * factor, "{:.3g}") for key in ("q50", "q05", "q95"))
             parameters.append(f"{full.split('.', 1)[1]} = {middle} ({low} to {high}) {unit}".rstrip())
         rows.append(
             {

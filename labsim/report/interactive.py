@@ -101,7 +101,7 @@ def plot_misfit(views: Sequence[DropView]) -> Spec:
         "height": 360,
         "margin": MARGIN,
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": -0.25, "yanchor": "top"},
+        "legend": {"orientation": "h", "y": -0.32, "yanchor": "top"},
         "xaxis": {"title": {"text": "impact speed (m/s)"}, "rangemode": "tozero"},
         "yaxis": {"title": {"text": "measured − simulated depth (%)"}, "zeroline": True},
     }
