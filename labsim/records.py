@@ -79,6 +79,7 @@ class Camera:
     pixel_size: float  # m
     surface_row: float  # px, rows grow downwards
     surface_row_sigma: float  # px
+    pixel_size_sigma: float = 0.0  # m, where the scale was measured
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .curve import check_drop_height, fit_deceleration
+from .checks import check_drop_height
+from .curve import fit_deceleration
 from .formats.folder import read_picture
 from .frames import Frames, open_frames
 from .local import fit_local_polynomial

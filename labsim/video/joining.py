@@ -101,8 +101,23 @@ def compare_with_edge(
     return rms
 
 
-def raise_to_scatter(row: FloatArray, sigma: FloatArray, what: str, warnings: list[str]) -> FloatArray:
-    """Raise the error bars of one end where it scatters about its neighbours by more than the error bars say."""
+def compare_lengths(gap: FloatArray, variance: FloatArray) -> float:
+    """How much more the distance between the ends of a rigid rod scatters than the error bars of both say; at least 1.
+
+    Unlike the scatter about the neighbours it also sees errors that last for many frames.
+    """
+    if len(gap) < 12:
+        return 1.0
+    return max(1.0, float(np.std(gap, ddof=1) / np.sqrt(np.mean(variance))))
+
+
+def raise_to_scatter(
+    row: FloatArray, sigma: FloatArray, what: str, warnings: list[str], tails: float = 4.0
+) -> FloatArray:
+    """Raise the error bars of one end where it scatters about its neighbours by more than the error bars say.
+
+    Beyond ``tails`` robust standard deviations a frame is an accident and does not count.
+    """
     index = np.flatnonzero(np.isfinite(row))
     if len(index) < 20:
         return sigma
@@ -113,7 +128,7 @@ def raise_to_scatter(row: FloatArray, sigma: FloatArray, what: str, warnings: li
     ratios = (weights @ row[near]) / np.sqrt(weights**2 @ sigma[near] ** 2)
     if ratios.size < 12:
         return sigma
-    inside = np.abs(ratios) < 4 * 1.4826 * np.median(np.abs(ratios))
+    inside = np.abs(ratios) < tails * 1.4826 * np.median(np.abs(ratios))
     factor = float(np.sqrt(np.mean(ratios[inside] ** 2)))
     if factor > 1.0 + 1.5 / np.sqrt(ratios.size):  # beyond what chance does with so few
         if factor > 1.6:

@@ -23,6 +23,7 @@ def fit_local_polynomial(track: Track, camera: Camera, curve: DecelerationCurve)
     t = track.time[used] - curve.contact_time.value
     z = (track.tip_row[used] - camera.surface_row) * camera.pixel_size
     s = track.sigma[used] * camera.pixel_size
+    scale_sigma = camera.pixel_size_sigma / camera.pixel_size
     stop = curve.stopping_time.value
     part = np.where(t < 0, 0, np.where(np.isfinite(stop) & (t > stop), 2, 1))
     rows = np.full((6, len(t)), np.nan)
@@ -36,7 +37,8 @@ def fit_local_polynomial(track: Track, camera: Camera, curve: DecelerationCurve)
         weights = np.linalg.pinv(np.vander(d / scale, ORDER + 1, increasing=True))[:3]
         for k, factor in enumerate((1.0, 1.0 / scale, 2.0 / scale**2)):
             rows[2 * k, i] = factor * (weights[k] @ z[near])
-            rows[2 * k + 1, i] = factor * np.sqrt(np.sum((weights[k] * s[near]) ** 2))
+            own = factor * np.sqrt(np.sum((weights[k] * s[near]) ** 2))
+            rows[2 * k + 1, i] = np.hypot(own, scale_sigma * rows[2 * k, i])
     names = (
         "depth_m",
         "depth_sigma_m",

@@ -10,13 +10,15 @@ from ..errors import MeasurementError
 from ..records import FloatArray, Measured
 from .clipping import ABOVE_PLATEAU
 from .ends import find_edge, find_tip_point, measure_shaft
-from .following import EndTrack, Progress, follow_end, follow_entering, restore_light
+from .following import Progress, follow_end, follow_entering, restore_light
 from .frames import Frames
-from .joining import clip_gap, compare_with_edge, join_ends, raise_to_scatter
-from .lossy import measure_widening
+from .joining import clip_gap, compare_lengths, compare_with_edge, join_ends, raise_to_scatter
+from .lossy import measure_widening, widen_for_hidden
 from .outline import Outline
 from .scene import Scene
 from .template import MARGIN
+
+LOSSY_TAILS = 8.0  # codecs treat frames of several kinds by turns: the worse kind is no accident
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,14 @@ def follow_rod(
             "video",
             "the tip is never seen free of the dust and the picture's edge; frame it wider",
         )
+    promised, tails = float(np.nanmedian(tip.sigma)), 4.0
     if frames.lossy:
-        top, tip = (_widen(frames, scene, usable, end, warnings) for end in (top, tip))
-        assert tip is not None
+        tails = LOSSY_TAILS
+        tip = replace(tip, sigma=tip.sigma * measure_widening(frames, scene, usable, tip))
+        if top is not None:
+            top = replace(top, sigma=top.sigma * measure_widening(frames, scene, usable, top))
+    # in a compressed video the scatter of each end is told in one line at the end
+    aside: list[str] = [] if frames.lossy else warnings
     known_above = scene.plateau + ABOVE_PLATEAU if np.isfinite(scene.limit) else -np.inf
     round_end = find_tip_point(tip.template, known_above=known_above)
     if round_end is None:
@@ -76,7 +83,7 @@ def follow_rod(
     else:
         tip_offset, tip_radius = round_end[0] + round_end[2], round_end[2]
     first_sigma = tip.sigma
-    tip = replace(tip, sigma=raise_to_scatter(tip.y, tip.sigma, "the tip", warnings))
+    tip = replace(tip, sigma=raise_to_scatter(tip.y, tip.sigma, "the tip", aside, tails))
     tip_y, tip_x = tip.y + tip_offset, tip.x
     tip_sigma = tip.sigma.copy()
     row, sigma, x = tip_y.copy(), tip_sigma.copy(), tip_x.copy()
@@ -84,7 +91,7 @@ def follow_rod(
     top_row = np.full(count, np.nan)
     length = edge_rms = tilt = diameter = None
     if top is not None:
-        top = replace(top, sigma=raise_to_scatter(top.y, top.sigma, "the top end", warnings))
+        top = replace(top, sigma=raise_to_scatter(top.y, top.sigma, "the top end", aside, tails))
         shaft = measure_shaft(top.template)
         if shaft is not None:
             tilt, diameter = shaft[0], Measured(shaft[1], shaft[2])
@@ -95,6 +102,11 @@ def follow_rod(
         both = np.isfinite(top.y) & np.isfinite(tip_y) & (tip_sigma < 0.3)
         if both.sum() >= 1:
             gap = tip_y[both] - top.y[both]
+            if frames.lossy:
+                longer = compare_lengths(gap, tip_sigma[both] ** 2 + top.sigma[both] ** 2)
+                tip, top = replace(tip, sigma=longer * tip.sigma), replace(top, sigma=longer * top.sigma)
+                tip_sigma = tip.sigma.copy()
+                sigma = tip_sigma.copy()
             variance = tip_sigma[both] ** 2 + top.sigma[both] ** 2
             gap, variance = clip_gap(gap, variance)
             reach = float(np.sum(gap / variance) / np.sum(1 / variance))
@@ -110,7 +122,7 @@ def follow_rod(
             tip_y = np.where(np.isfinite(entering.y), entering.y + tip_offset, tip_y)
             tip_x = np.where(np.isfinite(entering.y), entering.x, tip_x)
             ratio = float(np.nanmedian(tip.sigma / first_sigma))
-            own = raise_to_scatter(entering.y, entering.sigma * ratio, "the half-buried tip", warnings)
+            own = raise_to_scatter(entering.y, entering.sigma * ratio, "the half-buried tip", aside, tails)
             tip_sigma = np.where(np.isfinite(entering.y), own, tip_sigma)
             lowest = top.template.top + top.template.opacity.shape[0] - MARGIN
             shared = reach - tip_offset + tip.template.top + MARGIN < lowest
@@ -130,14 +142,12 @@ def follow_rod(
             )
     else:
         warnings.append("the top end is never in view: only frames with a free tip have a position")
+    if frames.lossy:
+        hidden = widen_for_hidden(frames.codec)
+        sigma = sigma * hidden
+        raised = hidden * float(np.nanmedian(tip.sigma)) / promised
+        warnings.append(
+            f"compressed with loss ({frames.codec.upper()}): error bars were raised {raised:.1f} "
+            "times, for what neighbouring pixels and frames share"
+        )
     return Positions(row, sigma, x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)
-
-
-def _widen(
-    frames: Frames, scene: Scene, usable: np.ndarray, end: EndTrack | None, warnings: list[str]
-) -> EndTrack | None:
-    """The track of one end with the error bars that a compressed video allows."""
-    if end is None:
-        return None
-    factor = measure_widening(frames, scene, usable, end)
-    return replace(end, sigma=factor * end.sigma)

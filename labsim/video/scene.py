@@ -10,14 +10,15 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured
+from .background import average_background, fill_holes, find_trusted
 from .frames import Frames
 from .noise import Noise, measure_noise
+from .surface import find_corridor, find_surface
 
 NEAR_CEILING = 0.99  # of the ceiling: a mean that high holds clipped pixels
 LEAST_CONTRAST = 4.0  # times the noise; below, every method fails (Cheezum et al. 2001)
 SPARSE = 4096  # pixels that stand for the picture where brightness and noise are followed in time
 NOISE_FRAMES = 600
-ROUGHEST_SURFACE = 3.0  # px rms about a straight line; beyond, it is a carpet or a picture, not raked dust
 
 
 @dataclass(frozen=True)
@@ -118,21 +119,21 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     projectile_level = float(np.percentile(low[moved], 25) if dark else np.percentile(high[moved], 75))
     # the extremes over many frames lie a few standard deviations out
     projectile_level += (1 if dark else -1) * 0.6 * pixel_noise
-    background, seen = _average_background(frames, brightness_array, low, high, swept, dark)
+    background, seen = average_background(frames, brightness_array, low, high, swept, dark)
     ceiling = float((1 << frames.bits) - 1)
     scene_level = np.where(seen, background, np.nan)
     lit_level = float(np.nanmedian(scene_level[swept])) if np.any(seen & swept) else float(np.median(beside))
     halfway = 0.5 * (lit_level + projectile_level)
     is_lit = (background > halfway) if dark else (background < halfway)
-    surface, surface_sigma = _find_surface(background, is_lit & seen, swept, noise, len(brightness))
-    background = _fill_holes(background, is_lit & seen, swept, surface)
-    trusted = _find_trusted(np.array(sparse).shape, background, high, low, swept, ceiling)
+    surface, surface_sigma = find_surface(background, is_lit & seen, swept)
+    background = fill_holes(background, is_lit & seen, swept, surface)
+    trusted = find_trusted(background)
     return Scene(
         background=background,
         projectile_level=projectile_level,
         trusted=trusted,
         swept=swept,
-        corridor=_find_corridor(swept),
+        corridor=find_corridor(swept),
         brightness=brightness_array,
         duplicate=np.array(duplicate),
         noise=noise,
@@ -143,129 +144,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     )
 
 
-def _find_corridor(swept: np.ndarray) -> tuple[int, int]:
-    """Columns over which the projectile passes: those swept over a great height, unlike those with spray."""
-    tall = swept.sum(axis=0)
-    columns = np.flatnonzero(tall > 0.7 * tall.max())
-    return int(columns[0]), int(columns[-1])
-
-
 def _otsu(values: FloatArray) -> float:
     top = float(np.percentile(values, 99.9))
     scaled = np.clip(values / max(top, 1e-6) * 255.0, 0, 255).astype(np.uint8)
     return cv2.threshold(scaled, 0, 255, cv2.THRESH_OTSU)[0] / 255.0 * top
-
-
-def _average_background(
-    frames: Frames, brightness: FloatArray, low: FloatArray, high: FloatArray, swept: np.ndarray, dark: bool
-) -> tuple[FloatArray, np.ndarray]:
-    """Mean of each pixel over the frames in which the projectile and its blurred edge are well away from it."""
-    every = max(1, len(brightness) // 300)
-    halfway = 0.5 * (low + high)
-    total = np.zeros(frames.shape, np.float64)
-    count = np.zeros(frames.shape, np.int32)
-    kernel = np.ones((9, 9), np.uint8)
-    for i, picture in enumerate(frames):
-        if i % every:
-            continue
-        level = picture.astype(np.float32) / np.float32(brightness[i])
-        blurred = cv2.blur(picture, (3, 3)).astype(np.float32) / np.float32(brightness[i])
-        covered = ((blurred < halfway) if dark else (blurred > halfway)) & swept
-        clear = cv2.dilate(covered.astype(np.uint8), kernel) == 0
-        total += np.where(clear, level, 0.0)
-        count += clear
-    seen = count > 0
-    return np.where(seen, total / np.maximum(count, 1), halfway), seen
-
-
-def _find_surface(
-    background: FloatArray, lit: np.ndarray, swept: np.ndarray, noise: Noise, count: int
-) -> tuple[tuple[float, float] | None, float]:
-    """Line through the half-way crossings from lit picture to dust beside the path; None where there is no dust."""
-    bottom = lit[-3:].mean()
-    if bottom > 0.3:
-        return None, 0.0
-    left, right = _find_corridor(swept)
-    radius = max(5, (right - left) // 4)
-    xs, ys = [], []
-    height = background.shape[0]
-    smooth = cv2.blur(background.astype(np.float32), (3, 1))
-    for x in range(background.shape[1]):
-        if left - radius // 2 < x < right + radius // 2:
-            continue
-        column = lit[:, x]
-        if not column.any() or column[-1]:
-            continue
-        edge = int(np.flatnonzero(column)[-1])
-        if edge < 12 or edge > height - 6:
-            continue
-        above = float(np.median(background[max(edge - 14, 0) : edge - 4, x]))
-        below = float(np.median(background[edge + 5 : edge + 15, x])) if edge + 8 < height else np.nan
-        if not np.isfinite(below):
-            continue
-        profile = (smooth[edge - 4 : edge + 6, x] - below) / (above - below)
-        fall = np.flatnonzero((profile[:-1] >= 0.5) & (profile[1:] < 0.5))
-        if fall.size == 0:
-            continue
-        k = int(fall[0])
-        xs.append(x)
-        ys.append(edge - 4 + k + (profile[k] - 0.5) / (profile[k] - profile[k + 1]))
-    if len(xs) < 12:
-        return None, 0.0
-    x, y = np.array(xs, float), np.array(ys)
-    keep = np.ones(len(x), bool)
-    for _ in range(4):
-        slope, offset = np.polyfit(x[keep], y[keep], 1)
-        misfit = y - slope * x - offset
-        keep = np.abs(misfit - np.median(misfit)) < 3.5 * max(1.4826 * np.median(np.abs(misfit)), 0.05)
-    roughness = float(np.std(misfit[keep]))
-    if roughness > ROUGHEST_SURFACE:
-        return None, 0.0
-    # neighbouring columns share the lumps of the surface: about one independent value per ten columns
-    sigma = max(roughness / np.sqrt(max(keep.sum() / 10.0, 1.0)), 0.02)
-    return (float(offset), float(slope)), sigma
-
-
-def _fill_holes(
-    background: FloatArray, lit: np.ndarray, swept: np.ndarray, surface: tuple[float, float] | None
-) -> FloatArray:
-    """Where the projectile always stood in the way, the smooth surface through the lit background takes its place."""
-    h, w = background.shape
-    y, x = np.mgrid[0:h, 0:w]
-    above = np.ones((h, w), bool) if surface is None else y < surface[0] + surface[1] * x - 4.0
-    first, last = _find_corridor(swept)
-    corridor = np.zeros((h, w), bool)
-    corridor[:, max(0, first - 4) : last + 5] = True
-    good = lit & above
-    holes = above & corridor & ~cv2.erode(good.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
-    if not holes.any() or (good & ~holes).sum() < 50:
-        return background
-    fit = good & ~holes
-    picks = np.flatnonzero(fit)[:: max(1, int(fit.sum() // 20000))]
-    u, v = (x / w * 2 - 1), (y / h * 2 - 1)
-    terms = [(i, j) for i in range(5) for j in range(5 - i)]
-    matrix = np.column_stack([u.flat[picks] ** i * v.flat[picks] ** j for i, j in terms])
-    target = background.flat[picks]
-    weights = np.linalg.lstsq(matrix, target, rcond=None)[0]
-    spread = target - matrix @ weights
-    calm = np.abs(spread) < 3 * 1.4826 * np.median(np.abs(spread)) + 1e-6
-    weights = np.linalg.lstsq(matrix[calm], target[calm], rcond=None)[0]
-    smooth = np.zeros((h, w))
-    for (i, j), weight in zip(terms, weights, strict=True):
-        smooth += weight * u**i * v**j
-    return np.where(holes, smooth, background)
-
-
-def _find_trusted(
-    _: tuple[int, ...],
-    background: FloatArray,
-    high: FloatArray,
-    low: FloatArray,
-    swept: np.ndarray,
-    ceiling: float,
-) -> np.ndarray:
-    """Pixels that respond: not stuck far from their neighbours' background, not dead under a passing projectile."""
-    near = cv2.medianBlur(background.astype(np.float32), 5)
-    departure = np.abs(background - near)
-    spread = 1.4826 * float(np.median(departure)) + 1e-6
-    return departure < max(12.0 * spread, 0.15 * float(np.ptp(near)))

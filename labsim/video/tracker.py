@@ -18,8 +18,9 @@ from .following import Progress
 from .frames import Frames
 from .gaps import find_gaps
 from .joining import raise_to_scatter
+from .lossy import widen_for_hidden
 from .outline import Outline, Outliner
-from .rod import Positions, follow_rod
+from .rod import LOSSY_TAILS, Positions, follow_rod
 from .scene import NEAR_CEILING, Scene, survey_scene
 
 
@@ -29,7 +30,7 @@ class Tracking:
 
     x : (n,) column of the tip; top_row : (n,) row of the top end, NaN where out of view; length, diameter : of the rod;
     surface : row of the dust's surface under the projectile; edge_difference : rms between the registration and the
-    independent erf edge.
+    independent erf edge; lossy : whether the video is compressed with loss.
     """
 
     track: Track
@@ -43,6 +44,7 @@ class Tracking:
     camera_rotation: Measured | None
     edge_difference: float | None
     scene: Scene
+    lossy: bool = False
 
 
 def track_projectile(
@@ -87,7 +89,14 @@ def follow_projectile(
     if is_bead(outlines[0]):
         found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
     if found is None:
-        check_direction(frames, outlines)
+        try:
+            check_direction(frames, outlines)
+        except MeasurementError:
+            # a hand that carries a ball up before it lets go is larger than the ball
+            found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
+            if found is None:
+                raise
+    if found is None:
         found = follow_rod(frames, scene, usable, outlines, warnings, progress, clipped=clipped)
     row, sigma, x = found.row, found.sigma, found.x
     reason = [
@@ -138,6 +147,7 @@ def follow_projectile(
         rotation,
         found.edge_difference,
         scene,
+        frames.lossy,
     )
 
 
@@ -148,7 +158,9 @@ def _follow_bare_bead(
     bead = follow_bead(frames, scene, usable)
     if bead is None or not needs_disc(outlines, bead.smear):
         return None
-    sigma = raise_to_scatter(bead.y, bead.sigma, "the bead", warnings)
+    sigma = raise_to_scatter(bead.y, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0)
+    if frames.lossy:
+        sigma = sigma * widen_for_hidden(frames.codec)
     longest = float(np.nanmax(bead.smear))
     if longest > 0.1 * bead.radius:
         warnings.append(

@@ -53,6 +53,25 @@ def test_scale_to_depth(tmp_path, capsys, drop, source) -> None:
     assert summary["penetration_depth_m"] == pytest.approx(truth["depth"] * PIXEL, rel=0.007)
     assert summary["stopping_time_s"] == pytest.approx(truth["stop"] / RATE, abs=2e-5)
     assert not any("per pixel" in text for text in summary["warnings"])
+    name = {"ruler": "ruler", "diameter": "rod diameter"}[source]
+    assert summary["pixel_size_source"] == name
+    assert summary["pixel_size_measured_m"][name]["sigma"] == summary["pixel_size_m_sigma"]
+    # the depth is not known better than the scale
+    share = summary["pixel_size_m_sigma"] / summary["pixel_size_m"]
+    assert summary["penetration_depth_m_sigma"] >= share * summary["penetration_depth_m"]
+
+
+def test_scale_is_said_with_its_error(tmp_path, capsys, drop) -> None:
+    _, truth, video, _ = drop
+    out, sigma = tmp_path / "out", 0.01
+    arguments = ["track", video, "--fps", RATE, "--surface-row", 280.0, "--pixel-um", 1e6 * PIXEL]
+    with pytest.raises(SystemExit):
+        main([str(each) for each in (*arguments, "--pixel-um-sigma", sigma * 1e6 * PIXEL, "-o", out)])
+    said = capsys.readouterr().out
+    assert "pixel size             20.400 ± 0.204 µm" in said
+    summary = json.loads((out / "drop.json").read_text())
+    assert summary["pixel_size_source"] == "stated"
+    assert summary["penetration_depth_m_sigma"] == pytest.approx(sigma * truth["depth"] * PIXEL, rel=0.2)
 
 
 def test_scales_that_disagree_are_said(tmp_path, capsys, drop) -> None:
@@ -62,7 +81,8 @@ def test_scales_that_disagree_are_said(tmp_path, capsys, drop) -> None:
     summary = measure(capsys, tmp_path / "out", video, "--pixel-um", 1.04e6 * PIXEL, *options)
     assert summary["pixel_size_m"] == pytest.approx(1.04 * PIXEL)
     text = " ".join(summary["warnings"])
-    assert "the ruler gives" in text and "the rod's diameter gives" in text
+    assert "the ruler gives" in text and "the rod diameter gives" in text
+    assert summary["pixel_size_source"] == "stated" and len(summary["pixel_size_measured_m"]) == 2
 
 
 def test_no_scale_no_curve(tmp_path, capsys, drop) -> None:

@@ -1,4 +1,7 @@
-"""The tracker against synthetic recordings with true rows (accuracy goals T1 to T14)."""
+"""The tracker against synthetic recordings with true rows (accuracy goals T1 to T14).
+
+``--junitxml=FILE`` keeps the figures that each test measured, as properties; docs/tracking.md quotes them.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,7 @@ def judge(recording, pictures, rows):
     return seen, error
 
 
-def test_clean_and_buried() -> None:
+def test_clean_and_buried(record_property) -> None:
     """T1, T2, T14: rms ≤ 1.5 × bound and ≤ 0.03 px, lock ≤ 0.01 px, slope ≤ 1e-3, no step > 0.02 px, cover 60–76 %."""
     errors, phases, scores, steps, slopes = [], [], [], [], []
     for seed in range(20):
@@ -59,6 +62,12 @@ def test_clean_and_buried() -> None:
         phases.append(rows[moving] % 1.0)
         scores.append((error / seen.track.sigma)[moving])
     error, phase, score = np.concatenate(errors), np.concatenate(phases), np.concatenate(scores)
+    record_property("T1 rms px", np.sqrt(np.mean(error**2)))
+    record_property("T1 rms / bound", np.sqrt(np.mean(error**2)) / bound(recording))
+    record_property("T1 lock px", 2 * abs(np.mean(error * np.exp(2j * np.pi * phase))))
+    record_property("T1 largest slope", np.max(np.abs(slopes)))
+    record_property("T2 mean step, largest step px", (np.mean(steps), np.max(np.abs(steps))))
+    record_property("T14 cover of rows", np.mean(np.abs(score) < 1))
     assert np.sqrt(np.mean(error**2)) <= min(1.5 * bound(recording), 0.03)
     lock = 2 * abs(np.mean(error * np.exp(2j * np.pi * phase)))
     assert lock <= 0.01
@@ -79,10 +88,11 @@ def test_clean_and_buried() -> None:
         ({"read_noise": 14.0, "gain": 0.0}, 2.0),  # C/s = 10
     ],
 )
-def test_hard_light(settings, limit) -> None:
+def test_hard_light(record_property, settings, limit) -> None:
     recording, pictures, rows, _ = record(1, **settings)
     seen, error = judge(recording, pictures, rows)
     good = seen.track.valid
+    record_property(f"T3, T11 {settings} rms / bound", np.std(error[good]) / bound(recording))
     assert good.mean() > 0.95
     assert np.std(error[good]) <= limit * bound(recording)
     assert abs(np.polyfit(rows[good], error[good], 1)[0]) <= 1e-3
@@ -90,16 +100,17 @@ def test_hard_light(settings, limit) -> None:
 
 
 @pytest.mark.parametrize("bits", [10, 12, 14, 16])
-def test_bit_depths_agree(bits) -> None:
+def test_bit_depths_agree(record_property, bits) -> None:
     """T4: the same scene in deeper words gives the same rows within 0.005 px."""
     recording, pictures, _, _ = record(2)
     deep, deep_pictures, _, _ = record(2, bits=bits)
     difference = follow(deep, deep_pictures).track.tip_row - follow(recording, pictures).track.tip_row
+    record_property(f"T4 {bits} bit px", np.sqrt(np.mean(difference**2)))
     assert np.sqrt(np.mean(difference**2)) <= 0.005
 
 
 @pytest.mark.parametrize(("quality", "limit"), [(90, 0.02), (50, 0.04), (20, 0.1)])
-def test_jpeg_compression(quality, limit) -> None:
+def test_jpeg_compression(record_property, quality, limit) -> None:
     """T5, the JPEG standard's own scale of quality, frame by frame."""
     recording, pictures, rows, _ = record(3)
     squeezed = []
@@ -107,6 +118,7 @@ def test_jpeg_compression(quality, limit) -> None:
         _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
         squeezed.append(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE))
     seen, error = judge(recording, squeezed, rows)
+    record_property(f"T5 JPEG {quality} rms px", np.sqrt(np.mean(error[seen.track.valid] ** 2)))
     assert np.sqrt(np.mean(error[seen.track.valid] ** 2)) <= limit
     assert seen.track.valid.mean() > 0.8  # what is left out is flagged
 
@@ -115,7 +127,7 @@ def test_jpeg_compression(quality, limit) -> None:
     ("codec", "quality", "warning"),
     [("MJPG", 95, None), ("MJPG", 1, "quality about"), ("XVID", None, "differences between frames")],
 )
-def test_compressed_files(tmp_path, codec, quality, warning) -> None:
+def test_compressed_files(tmp_path, record_property, codec, quality, warning) -> None:
     """T5: strong compression is said, and even XVID stays within 0.1 px."""
     recording, pictures, rows, _ = record(3)
     frames = open_frames(write_video(pictures, tmp_path / "drop.avi", codec, quality))
@@ -124,23 +136,34 @@ def test_compressed_files(tmp_path, codec, quality, warning) -> None:
     if quality != 1:
         seen = follow_projectile(frames, frame_rate=1e4, surface_row=recording.surface_row)
         error = seen.track.tip_row - rows[: len(seen.track.frame)]
+        record_property(f"T5 {codec} rms px", np.sqrt(np.nanmean(error**2)))
+        record_property(f"T5 {codec} cover", np.mean((np.abs(error) < seen.track.sigma)[seen.track.valid]))
         assert np.sqrt(np.nanmean(error**2)) <= 0.1
 
 
-@pytest.mark.parametrize(("crf", "limit", "cover"), [(23, 0.055, 0.6), (28, 0.055, 0.5), (35, 0.10, 0.35)])
-def test_h264(crf, limit, cover) -> None:
-    """T5: H.264 of three strengths, 0.049, 0.051 and 0.096 px rms measured; the error bars grow with the damage."""
-    recording = Recording()
-    depth, _ = fall_and_stop(90, 45.37 + 3 * 0.137, 2.3, 30.0)
-    frames = open_frames(DATA / "h264" / f"h264_crf{crf}.mp4")
-    seen = follow_projectile(frames, frame_rate=1e4, surface_row=recording.surface_row)
-    track = seen.track
-    error = (track.tip_row - recording.surface_row - depth[: len(track.frame)])[track.valid]
-    assert track.valid.mean() > 0.75
+@pytest.mark.parametrize(("crf", "limit"), [(23, 0.06), (28, 0.07), (35, 0.11)])
+def test_h264(record_property, crf, limit) -> None:
+    """T5: H.264 of three strengths, two recordings each: rows, and error bars that grow with the damage."""
+    errors, scores = [], []
+    for seed, name in ((3, f"h264_crf{crf}.mp4"), (0, f"h264_0_crf{crf}.mp4")):
+        recording = Recording()
+        depth, _ = fall_and_stop(90, 45.37 + seed * 0.137, 2.3, 30.0)
+        frames = open_frames(DATA / "h264" / name)
+        seen = follow_projectile(frames, frame_rate=1e4, surface_row=recording.surface_row)
+        track = seen.track
+        assert track.valid.mean() > 0.75 and seen.lossy
+        error = (track.tip_row - recording.surface_row - depth[: len(track.frame)])[track.valid]
+        errors.append(error)
+        scores.append(error / track.sigma[track.valid])
+        text = " ".join(track.warnings)
+        assert "differences between frames" in text and "error bars were raised" in text
+    error, score = np.concatenate(errors), np.concatenate(scores)
+    record_property(f"T5 H.264 crf {crf} rms px", np.sqrt(np.mean(error**2)))
+    cover = np.mean(np.abs(score) < 1)
+    record_property(f"T5 H.264 crf {crf} cover, rms score", (cover, np.sqrt(np.mean(score**2))))
     assert np.sqrt(np.mean(error**2)) <= limit
-    assert np.mean(np.abs(error) < track.sigma[track.valid]) > cover
-    text = " ".join(track.warnings)
-    assert "differences between frames" in text and "error bars were raised" in text
+    assert 0.60 <= cover <= 0.88, cover
+    assert np.sqrt(np.mean(score**2)) < 1.3
 
 
 @pytest.mark.parametrize(
@@ -153,11 +176,13 @@ def test_h264(crf, limit, cover) -> None:
         {"drift": 3.0},
     ],
 )
-def test_rotated_tilted_drifting(settings) -> None:
+def test_rotated_tilted_drifting(record_property, settings) -> None:
     """T6: slope ≤ 1e-3, and the rows are those along the fall."""
     recording, pictures, rows, _ = record(4, **settings)
     seen, error = judge(recording, pictures, rows)
     good = seen.track.valid
+    record_property(f"T6 {settings} slope", np.polyfit(rows[good], error[good], 1)[0])
+    record_property(f"T6 {settings} rms px", np.sqrt(np.mean(error[good] ** 2)))
     assert abs(np.polyfit(rows[good], error[good], 1)[0]) <= 1e-3
     assert np.sqrt(np.mean(error[good] ** 2)) <= 0.03
     if "tilt" in settings and seen.tilt is not None:
@@ -176,19 +201,21 @@ def test_camera_on_its_side_and_upside_down() -> None:
 
 
 @pytest.mark.parametrize("settings", [{"stripe": 100.0}, {"glare": 30.0}])
-def test_reflections(settings) -> None:
+def test_reflections(record_property, settings) -> None:
     """T7: bias ≤ 0.05 px or a flag."""
     recording, pictures, rows, _ = record(6, **settings)
     seen, error = judge(recording, pictures, rows)
     good = seen.track.valid
+    record_property(f"T7 {settings} mean, scatter px", (np.mean(error[good]), np.std(error[good])))
     assert np.abs(np.mean(error[good])) <= 0.05
     assert np.std(error[good]) <= 0.05
 
 
-def test_spray() -> None:
+def test_spray(record_property) -> None:
     """T8: spray below the top end does no harm; spray that reaches it is flagged, not believed."""
     recording, pictures, rows, _ = record(7, spray=0.3)
     seen, error = judge(recording, pictures, rows)
+    record_property("T8 mean px", np.nanmean(error))
     assert abs(np.nanmean(error)) <= 0.03 and seen.track.valid.mean() > 0.9
     recording, pictures, rows, _ = record(7, spray=0.5, spray_height=150.0)
     seen, error = judge(recording, pictures, rows)
@@ -229,7 +256,7 @@ def test_quantised_stamps_and_wrong_header() -> None:
 
 
 @pytest.mark.parametrize("dropped", [(20,), (20, 52, 53, 60), (47, 48, 49, 66), (10, 46, 47), ()])
-def test_missing_frames_without_numbers(dropped) -> None:
+def test_missing_frames_without_numbers(record_property, dropped) -> None:
     """T9: a file without numbers or stamps: the projectile's own step shows every gap, and T_s stays within 0.02 ms."""
     recording, pictures, _, truth = record(30, dropped=dropped)
     track = follow(recording, pictures).track
@@ -238,6 +265,7 @@ def test_missing_frames_without_numbers(dropped) -> None:
     gaps = sum(1 for k in dropped if k - 1 not in dropped)
     assert len(said) == gaps
     curve = fit_deceleration(track, Camera(1e4, 20e-6, recording.surface_row, 0.0))
+    record_property(f"T9 {dropped} T_s error s", curve.stopping_time.value - truth["stop"] * 1e-4)
     assert curve.stopping_time.value == pytest.approx(truth["stop"] * 1e-4, abs=2e-5)
 
 
@@ -268,19 +296,21 @@ def test_top_end_never_in_view() -> None:
     assert track.valid[rows < recording.surface_row - 12].all()
 
 
-@pytest.mark.parametrize(("bright", "limit"), [(262.0, 2.0), (300.0, 2.0), (340.0, 3.5)])
-def test_saturated_background(bright, limit) -> None:
-    """T11: scatter ≤ 2 × bound up to 18 % above the ceiling (3.3 × at 33 %), rows right to 0.05 px, and it is said."""
+@pytest.mark.parametrize("bright", [262.0, 300.0, 340.0])
+def test_saturated_background(record_property, bright) -> None:
+    """T11: a background 3, 18 and 33 % above the ceiling: scatter ≤ 2 × bound, rows right to 0.05 px, and it is said."""
     recording, pictures, rows, _ = record(11, bright=bright, vignette=0.0)
     seen, error = judge(recording, pictures, rows)
     good = seen.track.valid
     assert good.mean() > 0.95
-    assert np.std(error[good]) <= limit * bound(recording)
+    record_property(f"T11 {bright} rms / bound", np.std(error[good]) / bound(recording))
+    record_property(f"T11 {bright} mean px", np.mean(error[good]))
+    assert np.std(error[good]) <= 2.0 * bound(recording)
     assert abs(np.mean(error[good])) < 0.05
     assert any("saturated" in text for text in seen.track.warnings)
 
 
-def test_little_contrast() -> None:
+def test_little_contrast(record_property) -> None:
     """T12: at C/s = 5 the error bars hold 60-76 % of the errors and none lies beyond 4.5; below 4 it is refused."""
     scores = []
     for seed in range(8):
@@ -291,6 +321,7 @@ def test_little_contrast() -> None:
         assert np.std(error[good]) < 2 * bound(recording)
         scores.append((error / seen.track.sigma)[good])
     score = np.concatenate(scores)
+    record_property("T12 cover, largest error in sigma", (np.mean(np.abs(score) < 1), np.max(np.abs(score))))
     assert 0.60 <= np.mean(np.abs(score) < 1) <= 0.76, np.mean(np.abs(score) < 1)
     assert np.max(np.abs(score)) < 4.5
     recording, pictures, rows, _ = record(12, read_noise=50.0, gain=0.0)
@@ -298,12 +329,21 @@ def test_little_contrast() -> None:
         follow(recording, pictures)
 
 
-def test_end_to_end() -> None:
+def test_end_to_end(record_property) -> None:
     """T13 from pixels: v0 0.3 %, t0 and T_s 0.02 ms, D 0.5 %."""
     for seed in range(4):
         recording, pictures, _, truth = record(20 + seed, speed=4.0)
         track = follow(recording, pictures).track
         curve = fit_deceleration(track, Camera(1e4, 20e-6, recording.surface_row, 0.0))
+        record_property(
+            f"T13 seed {seed}: v0, t0 s, T_s s, D",
+            (
+                curve.impact_speed.value / (truth["speed"] * 0.2) - 1,
+                curve.contact_time.value - truth["contact"] * 1e-4,
+                curve.stopping_time.value - truth["stop"] * 1e-4,
+                curve.penetration_depth.value / (truth["depth"] * 20e-6) - 1,
+            ),
+        )
         assert curve.impact_speed.value == pytest.approx(truth["speed"] * 0.2, rel=0.003)
         assert curve.contact_time.value == pytest.approx(truth["contact"] * 1e-4, abs=2e-5)
         assert curve.stopping_time.value == pytest.approx(truth["stop"] * 1e-4, abs=2e-5)
@@ -311,12 +351,16 @@ def test_end_to_end() -> None:
 
 
 @pytest.mark.parametrize("name", ["ffv1", "mjpeg_3mm", "mjpeg"])
-def test_rendered_drops(name) -> None:
+def test_rendered_drops(record_property, name) -> None:
     """Videos from an independent renderer: ≤ 0.05 px rms against the true rows, nothing taken out of the mean."""
     folder = DATA / "rendered_drops"
     truth = json.loads((folder / "truth.json").read_text())[name]
     seen = follow_projectile(open_frames(folder / name / "video.avi"), frame_rate=1e4)
     error = seen.track.tip_row - np.array(truth["rows"])
+    record_property(
+        f"rendered {name} rms px, cover",
+        (np.sqrt(np.mean(error**2)), np.mean(np.abs(error) < seen.track.sigma)),
+    )
     assert seen.track.valid.all()
     assert np.sqrt(np.mean(error**2)) <= 0.05
     assert 0.6 < np.std(error / seen.track.sigma) < 1.5

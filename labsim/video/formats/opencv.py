@@ -69,7 +69,7 @@ def open_file(path: Path) -> Frames:
     lossy = codec not in LOSSLESS
     if codec in BETWEEN:
         warnings.append(
-            f"{codec.upper()} stores differences between frames: error bars may be too small; record MJPEG or raw"
+            f"{codec.upper()} stores differences between frames, which then err alike; record MJPEG or raw"
         )
     elif codec == "mjpg":
         quality = _estimate_quality(path)
