@@ -29,6 +29,7 @@ WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer e
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
 MOST_EXPLORED = 3
+MOST_SETTLED = 3  # large effects with runs at three strengths about them
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -77,6 +78,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     if is_open(bench, nominal, fits, screening):
         explored = explore(bench, nominal, screening)
         fits = confirm_explored(bench, nominal, fits, explored)
+    fits = settle_best(bench, fits)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
     verdict = judge(
@@ -179,6 +181,32 @@ def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: 
         if name not in known or fit.evidence > known[name].evidence:
             known[name] = fit
     return list(known.values())
+
+
+def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
+    """The fits with the best of those that are large made once more with runs at three strengths about them.
+
+    One or two strengths lead there; what tells two large effects apart is how they bend with p_m.
+    """
+    top = max((fit.evidence for fit in fits), default=0.0)
+    settled, again = [], 0
+    for fit in sorted(fits, key=lambda fit: -fit.evidence):
+        name = fit.hypothesis[0]
+        effect = bench.effects[name]
+        if (
+            again < MOST_SETTLED
+            and fit.evidence > top - CLOSE
+            and bench.costs_runs(name)
+            and effect.kind != "numerics"
+            and abs(fit.values[name]) > abs(effect.amplitudes[0].step)
+        ):
+            again += 1
+            with suppress(ExtrapolationError):
+                fit = fit_hypothesis(
+                    bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit
+                )
+        settled.append(fit)
+    return settled
 
 
 def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:

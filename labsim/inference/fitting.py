@@ -69,12 +69,14 @@ def fit_hypothesis(
     start: tuple[float, Mapping[str, float]],
     *,
     coarse: bool = False,
+    around: bool = False,
     nuisances: Fit | None = None,
     iterations: int = ITERATIONS,
 ) -> Fit:
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
-    coarse : what effects change is taken from fingerprints. nuisances : a fit whose nuisances are the starting values.
+    coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths about the estimate, not
+    one or two: what a large effect changes bends with p_m. nuisances : a fit whose nuisances are the starting values.
     """
     models = copy.deepcopy(nuisances.models if nuisances is not None else bench.models)
     speeds = list(nuisances.scan_speeds if nuisances is not None else (scan.stated for scan in bench.scans))
@@ -84,7 +86,7 @@ def fit_hypothesis(
     log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
     names = ("ln_p_m", *hypothesis)
     for iteration in range(iterations):
-        _ask(bench, hypothesis, log_p_m, values, coarse=coarse)
+        _ask(bench, hypothesis, log_p_m, values, coarse=coarse, around=around)
         linear = linearise_at(bench, models, speeds, log_p_m, values)
         step, covariance, _chi, _logdet, weighted = solve_globals(
             linear.blocks, names, _priors(bench, values)
@@ -103,7 +105,7 @@ def fit_hypothesis(
             shift = max(shift, 0.5 * moved_by)
         if max(change) < SETTLED and shift < 0.05 and iteration > 0:
             break
-    _ask(bench, hypothesis, log_p_m, values, coarse=coarse)
+    _ask(bench, hypothesis, log_p_m, values, coarse=coarse, around=around)
     linear = linearise_at(bench, models, speeds, log_p_m, values)
     step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
     solved_here = sum(chi_square(block) for block in linear.blocks)
@@ -226,7 +228,13 @@ def _linearise_dust(bench: Workbench, values: Mapping[str, float], probes: Probe
 
 
 def _ask(
-    bench: Workbench, hypothesis: Hypothesis, log_p_m: float, values: Mapping[str, float], *, coarse: bool
+    bench: Workbench,
+    hypothesis: Hypothesis,
+    log_p_m: float,
+    values: Mapping[str, float],
+    *,
+    coarse: bool,
+    around: bool,
 ) -> None:
     bench.require_base(enclosing_nodes(log_p_m))
     wanted = [
@@ -234,7 +242,7 @@ def _ask(
         for name in hypothesis
         if bench.costs_runs(name)
         for amplitude in amplitude_nodes(bench, name, values[name], coarse=coarse)
-        for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m))
+        for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, around=around))
     ]
     if wanted:
         bench.require_changes(wanted, " and ".join(hypothesis), coarse=coarse)

@@ -1,7 +1,7 @@
 """What the simulation says a drop's camera should have recorded, for any p_m, speed and amplitudes of effects near the runs.
 
 Codes of runs (curves.py) are interpolated in ln v over all speed nodes and in ln p_m over all strength nodes; an effect adds the
-difference its own runs made, a polynomial in its amplitude that vanishes at null, linear between strength nodes.
+difference its own runs made, a polynomial in its amplitude that vanishes at null, through up to three strength nodes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import ExtrapolationError
 from ..records import FloatArray
 from .curves import decode_depth, decode_rate
-from .grid import interpolation_weights, strength_node
+from .grid import STRENGTH_RATIO, interpolation_weights, strength_node
 
 STANDARD_GRAVITY = 9.81
 
@@ -25,9 +25,9 @@ Changes = dict[int, dict[float, FloatArray]]
 
 @dataclass
 class ResponseTable:
-    """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (few, m)}}}
-    where the amplitude is the parameter minus its null and the arrays are differences from the base at the few speeds.
-    fingerprints : the same from coarser runs, taken where there are no changes."""
+    """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
+    where the amplitude is the parameter minus its null and the arrays are differences from the base at all speeds.
+    fingerprints : the same from coarser runs at the few speeds, taken where there are no changes."""
 
     log_speeds: FloatArray
     few: tuple[int, ...]
@@ -40,7 +40,9 @@ class ResponseTable:
         across = interpolation_weights(self.log_speeds, log_speed)
         nearest = sorted(self.base, key=lambda index: abs(math.log(strength_node(index)) - log_p_m))[:4]
         if not nearest:
-            raise ExtrapolationError("simulation", "runs", "every run of one projectile failed; see labsim runs")
+            raise ExtrapolationError(
+                "simulation", "runs", "every run of one projectile failed; see labsim runs"
+            )
         nodes = np.array([math.log(strength_node(index)) for index in nearest])
         code = sum(
             weight * (across @ self.base[index])
@@ -53,21 +55,26 @@ class ResponseTable:
 
     def change(self, name: str, log_p_m: float, amplitude: float, log_speed: float) -> FloatArray:
         """What an effect adds to the code, (m,)."""
-        table = self.changes[name] if name in self.changes else self.fingerprints[name]
-        across = interpolation_weights(self.log_speeds[list(self.few)], log_speed)
-        available = sorted((index for index in table if table[index]), key=lambda index: strength_node(index))
-        nodes = np.array([math.log(strength_node(index)) for index in available])
-        values = []
-        for index in available:
+        if name in self.changes:
+            table, across = self.changes[name], interpolation_weights(self.log_speeds, log_speed)
+        else:
+            few = self.log_speeds[list(self.few)]
+            table, across = self.fingerprints[name], interpolation_weights(few, log_speed)
+        nearest = sorted(
+            (index for index in table if table[index]),
+            key=lambda index: abs(math.log(strength_node(index)) - log_p_m),
+        )[:3]
+        nodes = np.array([math.log(strength_node(index)) for index in nearest])
+        margin = 0.5 * math.log(STRENGTH_RATIO)
+        inside = float(np.clip(log_p_m, nodes.min() - margin, nodes.max() + margin))
+        change = np.zeros(0)
+        for index, weight in zip(nearest, interpolation_weights(nodes, inside), strict=True):
             known = sorted(table[index], key=lambda a: abs(a - amplitude))[:3]
             at = np.array([0.0, *known])
-            weights = interpolation_weights(at, amplitude)[1:]
-            values.append(sum(w * (across @ table[index][a]) for a, w in zip(known, weights, strict=True)))
-        if len(values) == 1:
-            return values[0]
-        below = int(np.clip(np.searchsorted(nodes, log_p_m) - 1, 0, len(nodes) - 2))
-        part = float(np.clip((log_p_m - nodes[below]) / (nodes[below + 1] - nodes[below]), -0.5, 1.5))
-        return (1 - part) * values[below] + part * values[below + 1]
+            shares = interpolation_weights(at, amplitude)[1:]
+            part = sum(share * (across @ table[index][a]) for a, share in zip(known, shares, strict=True))
+            change = weight * part + (change if change.size else 0.0)
+        return np.asarray(change)
 
 
 @dataclass(frozen=True)

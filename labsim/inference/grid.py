@@ -30,7 +30,7 @@ Change = Callable[[DropSetting], DropSetting]
 class Family:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
-    few : positions among them at which changes by effects are simulated, smoother in speed than what they change.
+    few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change.
     """
 
     projectile: Projectile
@@ -43,7 +43,7 @@ class Family:
 class Request:
     """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    cells : spacings in a tip radius, at the few speeds that changes need; None for the full base at its own spacing.
+    cells : spacings in a tip radius; coarser ones than the base's at the few speeds that fingerprints need.
     """
 
     variant: str
@@ -135,7 +135,8 @@ class RunGrid:
         settings, places = [], []
         for request, number in missing:
             family = self.families[number]
-            positions = range(len(family.speeds)) if request.cells is None else family.few
+            coarse = request.cells is not None and request.cells < self.cells
+            positions = family.few if coarse else range(len(family.speeds))
             for position in positions:
                 setting = self.setting(
                     family, family.speeds[position], strength_node(request.index), request.cells

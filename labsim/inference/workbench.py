@@ -332,10 +332,12 @@ def enclosing_nodes(log_p_m: float) -> list[int]:
     return [below - 1, below, below + 1, below + 2]
 
 
-def nearest_nodes(log_p_m: float, share: float = 0.3) -> list[int]:
-    """The nearest strength node, and the next one where the value lies well between two."""
+def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -> list[int]:
+    """The nearest strength node, and the next one where the value lies well between two; ``around``: both neighbours too."""
     place = (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
     near = round(place)
+    if around:
+        return [near - 1, near, near + 1]
     if abs(place - near) <= share:
         return [near]
     return [math.floor(place), math.ceil(place)]

@@ -79,6 +79,22 @@ def test_effects_add_a_polynomial_that_vanishes_at_null():
     assert table.code(math.log(1200.0), speeds[1], {"e": 1.5}) - plain == pytest.approx(0.225, rel=1e-12)
 
 
+def test_what_an_effect_changes_bends_with_strength_through_three_nodes():
+    speeds = np.log([0.2, 0.3, 0.4])
+    base = np.stack([sine_code() for _ in speeds])
+    table = ResponseTable(speeds, (0, 2), {k: base for k in (-1, 0, 1)})
+
+    def bend(lp):
+        return 0.2 + 0.1 * (lp - math.log(1000.0)) + 0.05 * (lp - math.log(1000.0)) ** 2
+
+    table.changes["e"] = {k: {1.0: np.full_like(base, bend(math.log(1000.0 * 2.0**k)))} for k in (-1, 0, 1)}
+    for p_m in (550.0, 1000.0, 1370.0):
+        found = table.change("e", math.log(p_m), 1.0, speeds[1])
+        assert found == pytest.approx(bend(math.log(p_m)), rel=1e-9)
+    beyond = table.change("e", math.log(8000.0), 1.0, speeds[1])  # held half a node beyond the last
+    assert beyond == pytest.approx(bend(math.log(2000.0 * math.sqrt(2.0))), rel=1e-9)
+
+
 def make_drop(height=20e-3):
     camera = Camera(frame_rate=10000.0, pixel_size=20e-6, surface_row=300.0, surface_row_sigma=0.15)
     projectile = Projectile("hemisphere", 5e-4, 1.33e-6)
