@@ -1,0 +1,91 @@
+"""Film a drop: rows of the tip in frames, with noise, missing frames, outliers and a surface row that was read off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from drop import GRAVITY, Result
+
+ROW_SIGMA = 0.08  # px
+SURFACE_SIGMA = 0.15  # px
+HEIGHT_SIGMA = 0.15e-3  # m
+MISSING = 0.0095  # share of the frames
+OUTLIERS = 0.0017
+
+
+@dataclass(frozen=True)
+class Filming:
+    """What the camera is, and what is wrong with it."""
+
+    frame_rate: float  # Hz, as stated
+    pixel_size: float  # m, as stated
+    after: float  # s of film after contact
+    pixel_factor: float = 1.0  # true over stated
+    frame_factor: float = 1.0
+    surface_error: float = 0.0  # px added to the stated row
+    wobble: tuple[float, float] = (0.0, 1.0)  # px, Hz
+
+
+def depth_at(result: Result, speed: float, time: np.ndarray) -> np.ndarray:
+    """Depth of the tip (m), free fall before contact and free flight after the simulation's end."""
+    before = speed * time + 0.5 * GRAVITY * time**2
+    inside = np.interp(time, result.time, result.depth)
+    late = time - result.time[-1]
+    flight = result.depth[-1] + result.speed[-1] * late + 0.5 * GRAVITY * late**2
+    flight = np.minimum(flight, result.stopping_depth)  # it comes back to where it lay
+    return np.where(time < 0.0, before, np.where(late > 0.0, flight, inside))
+
+
+def film(result: Result, speed: float, filming: Filming, rng: np.random.Generator):
+    """Frames and rows of the track, and the row of the surface as stated."""
+    rate = filming.frame_rate * filming.frame_factor
+    before = min(120.0 / filming.frame_rate, 0.97 * speed / GRAVITY)
+    first = int(before * rate)
+    contact = first + rng.uniform(0.0, 1.0)
+    frames = np.arange(first + int(filming.after * rate) + 1)
+    time = (frames - contact) / rate
+    surface = 300.0 + rng.uniform(-4.5, 3.5)
+    rows = surface + depth_at(result, speed, time) / (filming.pixel_size * filming.pixel_factor)
+    amplitude, frequency = filming.wobble
+    rows = rows + amplitude * np.sin(2.0 * np.pi * (frequency * time + rng.uniform()))
+    rows = rows + rng.normal(0.0, ROW_SIGMA, rows.size)
+    stray = rng.uniform(size=rows.size) < OUTLIERS
+    rows = rows + stray * rng.uniform(4.0, 9.0, rows.size) * rng.choice([-1.0, 1.0], rows.size)
+    kept = rng.uniform(size=rows.size) >= MISSING
+    kept[0] = True
+    return frames[kept], rows[kept], surface + rng.normal(0.0, SURFACE_SIGMA) + filming.surface_error
+
+
+def write_drop(
+    folder: Path, frames, rows, surface, *, radius, mass, sequence, height, filming: Filming
+) -> None:
+    folder.mkdir(parents=True)
+    lines = [f"{frame},{row:.3f}" for frame, row in zip(frames, rows, strict=True)]
+    (folder / "track.csv").write_text("frame,tip_row_px\n" + "\n".join(lines) + "\n")
+    (folder / "drop.toml").write_text(
+        f"""[projectile]
+tip = "hemisphere"
+tip_radius_mm = {radius * 1e3:.3f}
+length_mm = {4.0 if radius < 1e-3 else 9.0:.2f}
+mass_mg = {mass * 1e6:.4f}
+mass_sigma_mg = {mass * 5e3:.4f}
+
+[drop]
+sequence = {sequence}
+height_mm = {height * 1e3:.2f}
+height_sigma_mm = {HEIGHT_SIGMA * 1e3:.2f}
+
+[camera]
+frame_rate_Hz = {filming.frame_rate:.1f}
+pixel_size_um = {filming.pixel_size * 1e6:.2f}
+surface_row_px = {surface:.2f}
+surface_row_sigma_px = {SURFACE_SIGMA:.2f}
+
+[record]
+file = "track.csv"
+kind = "track"
+row_sigma_px = {ROW_SIGMA:.2f}
+"""
+    )
