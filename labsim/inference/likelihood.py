@@ -29,6 +29,9 @@ from .observe import STANDARD_GRAVITY, ObservedDrop
 BIN = 8  # frames of free fall averaged into one point
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
+USUAL_SWIFTNESS = (
+    1.85  # ln of speed over root of gravity and radius, where p_m makes up for all of the solver's error
+)
 MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
 
 
@@ -41,7 +44,7 @@ class Terms:
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.004  # of the depth, smooth
-    numerical_slope: float = 0.01  # of the depth, per e-fold of depth over tip radius, common to all drops
+    numerical_slope: float = 0.01  # of the depth, per e-fold of speed over √radius, common to all drops
     heights: bool = True
 
 
@@ -187,11 +190,10 @@ def linearise(
             shared.setdefault(f"{kind} {key}", []).append((sections[name], column))
         offset_column = np.concatenate([np.full(here.size, terms.contact_offset * model.radius), pad])
         shared.setdefault("contact offset", []).append((sections[name], offset_column))
-        shallow = np.maximum(here, 0.0)  # depths that few spacings resolve are the least converged
-        slope = shallow * np.log(np.maximum(shallow, 0.02 * model.radius) / model.radius)
-        shared.setdefault("numerical slope", []).append(
-            (sections[name], np.concatenate([slope * terms.numerical_slope, pad]))
-        )
+        # two codes part slowly from slow to fast drops: the one is too deep at one end, too shallow at the other
+        swift = instant.log_speed - 0.5 * math.log(STANDARD_GRAVITY * model.radius) - USUAL_SWIFTNESS
+        slope = np.maximum(here, 0.0) * swift * terms.numerical_slope
+        shared.setdefault("numerical slope", []).append((sections[name], np.concatenate([slope, pad])))
         final = float(np.exp(code[0]))
         stop = float(np.exp(code[1]))
         clock = model.matrix @ (observed.time / instrument.rate_factor - instant.contact_time)
