@@ -66,7 +66,7 @@ def follow_rod(
             "video",
             "the tip is never seen free of the dust and the picture's edge; frame it wider",
         )
-    promised, tails = float(np.nanmedian(tip.sigma)), 4.0
+    first_sigma, tails = tip.sigma, 4.0  # what the pixels alone promise
     if frames.lossy:
         tails = LOSSY_TAILS
         tip = replace(tip, sigma=tip.sigma * measure_widening(frames, scene, usable, tip))
@@ -82,7 +82,6 @@ def follow_rod(
         tip_offset, tip_radius = float(rows[-1]) + 0.5 + tip.template.top, None
     else:
         tip_offset, tip_radius = round_end[0] + round_end[2], round_end[2]
-    first_sigma = tip.sigma
     tip = replace(tip, sigma=raise_to_scatter(tip.y, tip.sigma, "the tip", aside, tails))
     tip_y, tip_x = tip.y + tip_offset, tip.x
     tip_sigma = tip.sigma.copy()
@@ -145,7 +144,7 @@ def follow_rod(
     if frames.lossy:
         hidden = widen_for_hidden(frames.codec)
         sigma = sigma * hidden
-        raised = hidden * float(np.nanmedian(tip.sigma)) / promised
+        raised = hidden * float(np.nanmedian(tip.sigma / first_sigma))
         warnings.append(
             f"compressed with loss ({frames.codec.upper()}): error bars were raised {raised:.1f} "
             "times, for what neighbouring pixels and frames share"

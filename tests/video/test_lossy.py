@@ -23,6 +23,7 @@ def test_noise_shared_in_blocks(monkeypatch, size, codec) -> None:
     )
     monkeypatch.setattr(rod, "raise_to_scatter", lambda row, sigma, *_: sigma)
     monkeypatch.setattr(rod, "compare_lengths", lambda *_: 1.0)
+    monkeypatch.setattr(rod, "widen_for_hidden", lambda codec: 1.0)
     recording = Recording()
     depth, _ = fall_and_stop(90, 45.37, 2.3, 30.0)
     pictures, rows = render(recording, depth, 5)
