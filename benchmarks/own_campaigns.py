@@ -1,6 +1,7 @@
 """Hide effects in campaigns of labsim's own solver at another spacing, and count what the diagnosis finds.
 
-    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 3] [--sigma 8,16] [--workers 2] [--drops D01,D02] [--effects a,b]
+    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 3] [--sigma 8,16] [--workers 2] [--drops D01,D02]
+                                           [--effects a,b] [--maps]
 
 Writes OUT/rows.jsonl, one line a campaign; a second call goes on where the first stopped. Prints false alarms and coverage on
 the nulls, exact and class hit rates per strength, p_m coverage with the extension, a reliability table of the probabilities.
@@ -23,7 +24,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta
 
-from labsim.campaign import read_campaign
+from labsim.campaign import read_campaign, read_scan
+from labsim.ct.reduce import ReducedScan, reduce_scan
 from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
@@ -32,28 +34,38 @@ from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 
 CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
+SCANS = [
+    CAMPAIGN.parents[1] / "ct" / "labelled_scans" / name for name in ("p01-C01", "p05-C02")
+]  # frames, masks and errors of maps
 NOT_HIDDEN = ("resolution", "planar_geometry", "gravity")  # no truth of their own here
 VOXEL = 40e-6  # m
 OFF_DEFAULT = 0.8  # hidden shapes are this share of the stated one
 
 
-def open_campaign(drops: str) -> Campaign:
+def open_campaign(drops: str, maps: bool) -> tuple[Campaign, list[ReducedScan]]:
+    """The campaign whose drops are filmed again, and the reduced scans whose frames its maps take."""
     campaign = read_campaign(CAMPAIGN)
     chosen = [drop for drop in campaign.drops if not drops or drop.name in drops.split(",")]
+    if maps:
+        scans = [replace(read_scan(path), name=f"C{k:02d}") for k, path in enumerate(SCANS, start=1)]
+        reduced = [reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor) for scan in scans]
+        return replace(campaign, drops=tuple(chosen), scans=tuple(scans)), reduced
     projectile = chosen[0].projectile
     bead = Projectile("sphere", projectile.tip_radius, projectile.mass)
     grey = GreyCalibration(12.0, 0.16, campaign.sample.monomer_density)
     scan = Scan(
         "C01", bead, Measured(0.8, 0.04), Path(), VOXEL, "top", 8, grey
     )  # only its undisturbed dust is made
-    return replace(campaign, drops=tuple(chosen), scans=(scan, replace(scan, name="C02")))
+    return replace(campaign, drops=tuple(chosen), scans=(scan, replace(scan, name="C02"))), []
 
 
-def judge_hidden(job: tuple[Campaign, Path | None, TruthTable, Hidden, int, float]) -> dict:
+def judge_hidden(
+    job: tuple[Campaign, list[ReducedScan], Path | None, TruthTable, Hidden, int, float],
+) -> dict:
     """Film one truth and judge it."""
-    campaign, store_at, truth, hidden, seed, strength = job
+    campaign, templates, store_at, truth, hidden, seed, strength = job
     began = time.perf_counter()
-    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed))
+    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed), templates=templates)
     found = judge_campaign(*prepare(campaign, RunStore(store_at), workers=1, measurements=measurements))
     names = found.screening.names
     alike = []
@@ -166,10 +178,12 @@ def main() -> None:
     parser.add_argument("--drops", default="")
     parser.add_argument("--effects", default="")
     parser.add_argument("--store", type=Path, default=None)
+    parser.add_argument("--maps", action="store_true", help="maps of the compacted zone too")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out / "rows.jsonl"
-    campaign, store = open_campaign(options.drops), RunStore(options.store)
+    campaign, templates = open_campaign(options.drops, options.maps)
+    store = RunStore(options.store)
     truth = TruthTable(campaign, store, workers=options.workers)
     truth.prepare([])
     chosen = []
@@ -192,7 +206,7 @@ def main() -> None:
     for hidden, seed, sigma in plan:
         hidden = replace(hidden, p_m=float(np.exp(np.log(1300.0) + 0.15 * draw.standard_normal())))
         if (hidden.cause, seed) not in done:
-            jobs.append((campaign, options.store, replace(truth, store=None), hidden, seed, sigma))
+            jobs.append((campaign, templates, options.store, replace(truth, store=None), hidden, seed, sigma))
     with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
         for number, row in enumerate(pool.map(judge_hidden, jobs), start=1):
             file.write(json.dumps(row) + "\n")

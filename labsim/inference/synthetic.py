@@ -2,21 +2,24 @@
 
 Tracks come from runs at TRUTH_CELLS spacings a radius on nodes of speed and p_m of their own; each drop gets a camera that
 starts at its own instant, a height that is not quite the stated one, a sample of its own strength, a surface row that is
-off within its uncertainty, noise, missing frames and outliers. Scans are given as what their undisturbed dust shows.
+off within its uncertainty, noise, missing frames and outliers. Scans are given as what their undisturbed dust shows, and, where
+a reduced scan is given as a template, as a map of a run of their own at TRUTH_SCAN_CELLS.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..ct.project import project
+from ..ct.reduce import ReducedScan
 from ..effects import Effect, Instrument, list_effects, list_places
 from ..errors import SimulationError
 from ..records import Campaign, Drop, FloatArray, Projectile, Track
-from ..sph import DropRun, DropSetting
+from ..sph import DropRun, DropSetting, simulate
 from ..sph.particles import initial_filling_factor
 from .curves import encode_run
 from .forward import Instant, ResponseTable, predict_depth
@@ -26,7 +29,7 @@ from .observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
 from .runs import Progress, RunStore
 from .undisturbed import UndisturbedDust
 
-TRUTH_CELLS = 6
+TRUTH_CELLS, TRUTH_SCAN_CELLS = 6, 10
 SPEED_ANCHOR, SPEED_RATIO = 0.13, 1.6
 STRENGTHS = (850.0, 1300.0, 2000.0)  # Pa, nodes of the truth
 SCATTER = 0.02  # of ln p_m from sample to sample
@@ -34,6 +37,7 @@ OUTLIERS, MISSING = 0.01, 0.01  # shares of frames
 AFTER_STOP = 1.1  # frames kept, in stopping times
 ROW_NOISE = 1.5e-4  # of the filling factor of a row of undisturbed dust
 ROW_STEP, ROW_DEPTH = 8e-5, 3.3e-3  # m
+LIFT = 40e-6  # m, of a bead at rest over where its run ends: scale of an exponential law
 
 
 @dataclass(frozen=True)
@@ -143,9 +147,16 @@ def _own_nodes(slowest: float, fastest: float) -> tuple[float, ...]:
 
 
 def measure_hidden(
-    truth: TruthTable, hidden: Hidden, rng: np.random.Generator, scans: int = 2
+    truth: TruthTable,
+    hidden: Hidden,
+    rng: np.random.Generator,
+    scans: int = 2,
+    templates: Sequence[ReducedScan] = (),
 ) -> Measurements:
-    """What the cameras and the scanner would have recorded of a truth. Raises SimulationError where its runs are missing."""
+    """What the cameras and the scanner would have recorded of a truth. Raises SimulationError where its runs are missing.
+
+    templates : reduced scans of the campaign whose frame, mask and errors the maps of this truth take; none, no maps.
+    """
     campaign = truth.campaign
     effect = None if hidden.cause == "none" else truth.effect(hidden.cause)
     places, fractions = list_places(campaign), sequence_fractions(campaign.drops)
@@ -171,7 +182,38 @@ def measure_hidden(
         seen = level + ROW_NOISE * rng.standard_normal(depth.size)
         spread = math.hypot(scan.voxel * math.exp(0.1 * rng.standard_normal()), instrument.ct_blur)
         dust.append(UndisturbedDust(scan, depth, seen, np.full(depth.size, ROW_NOISE), spread))
-    return Measurements(drops, dust=dust)
+    maps = [_scan(truth, hidden, effect, template, rng) for template in templates]
+    return Measurements(drops, maps, dust)
+
+
+def _scan(
+    truth: TruthTable, hidden: Hidden, effect: Effect | None, template: ReducedScan, rng: np.random.Generator
+) -> ReducedScan:
+    """The map of one bead of this truth: its speed, sample, lift and noise drawn anew, in the frame of the template's bead."""
+    scan, place = template.scan, list_places(truth.campaign)[template.scan.name]
+    speed = scan.speed.value + scan.speed.sigma * rng.standard_normal()
+    p_m = hidden.p_m * math.exp(SCATTER * rng.standard_normal())
+    setting = set_nominal_drop(truth.campaign, _bare(scan.projectile), speed, p_m, TRUTH_SCAN_CELLS)
+    instrument = Instrument()
+    if effect is not None:
+        setting = effect.apply(setting, hidden.values, place)
+        instrument = effect.apply_to_instrument(instrument, hidden.values, place)
+    run = simulate(setting)
+    dust, tip = run.particles, run.penetration_depth - LIFT * rng.exponential()
+    frame = replace(template.map, z=template.map.z - (tip - template.map.tip_depth), tip_depth=tip)
+    seen = project(
+        dust.r,
+        dust.z,
+        dust.volume,
+        dust.filling_factor,
+        frame,
+        blur=math.hypot(template.point_spread, instrument.ct_blur),
+        shift=run.penetration_depth - tip,
+        scale=instrument.ct_scale,
+        of_particles=True,
+    )
+    noise = np.nan_to_num(frame.sigma) * rng.standard_normal(seen.shape)
+    return replace(template, map=replace(frame, filling_factor=seen + noise))
 
 
 def _film(

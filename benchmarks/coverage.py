@@ -1,0 +1,91 @@
+"""Does the 90 % interval of p_m hold what it says? Campaigns of labsim's own solver at another spacing, calibrated and counted.
+
+    python benchmarks/coverage.py OUT [--campaigns 60] [--workers 2]
+
+Every campaign has 15 drops of four projectiles and two maps, with every nuisance that labsim.inference.synthetic knows, and a p_m
+of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. Prints coverage and the goodness of fit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from own_campaigns import interval, open_campaign
+
+from labsim.ct.reduce import ReducedScan
+from labsim.inference.calibrate import prepare, sample_fit
+from labsim.inference.fitting import goodness_of_fit
+from labsim.inference.runs import RunStore
+from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.records import Campaign
+
+SPREAD = 0.15  # of ln p_m about 1300 Pa, inside the truth's own nodes
+
+
+def calibrate_hidden(job: tuple[Campaign, list[ReducedScan], Path | None, TruthTable, int]) -> dict:
+    """Film one nominal campaign and calibrate it."""
+    campaign, templates, store, truth, seed = job
+    rng = np.random.default_rng(seed)
+    p_m = float(np.exp(np.log(1300.0) + SPREAD * rng.standard_normal()))
+    measurements = measure_hidden(truth, Hidden(p_m=p_m), rng, templates=templates)
+    began = time.perf_counter()
+    bench, fit = prepare(campaign, RunStore(store), workers=1, measurements=measurements)
+    samples = sample_fit(bench, fit, seed=seed).samples("p_m_Pa")
+    low, middle, high = np.quantile(samples, [0.05, 0.5, 0.95])
+    return {
+        "seed": seed,
+        "p_m": p_m,
+        "low": low,
+        "middle": middle,
+        "high": high,
+        "rank": float(np.mean(samples < p_m)),
+        "goodness": goodness_of_fit(fit),
+        "wall": time.perf_counter() - began,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--campaigns", type=int, default=60)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--store", type=Path, default=None)
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    log = options.out / "rows.jsonl"
+    campaign, templates = open_campaign("", True)
+    truth = TruthTable(campaign, RunStore(options.store), workers=options.workers)
+    truth.prepare([])
+    done = {json.loads(line)["seed"] for line in log.read_text().splitlines()} if log.exists() else set()
+    jobs = [
+        (campaign, templates, options.store, replace(truth, store=None), seed)
+        for seed in range(70_000, 70_000 + options.campaigns)
+        if seed not in done
+    ]
+    with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
+        for number, row in enumerate(pool.map(calibrate_hidden, jobs), start=1):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(
+                f"{number}/{len(jobs)}: {row['p_m']:.0f} in {row['low']:.0f} to {row['high']:.0f}", flush=True
+            )
+    table = pd.DataFrame([json.loads(line) for line in log.read_text().splitlines()])
+    print(f"p_m in its 90 % interval {interval((table.low < table.p_m) & (table.p_m < table.high))}")
+    print(f"goodness of fit below 0.05 {interval(table.goodness < 0.05)}")
+    print(f"ranks of the truth in tenths {np.histogram(table['rank'], np.linspace(0, 1, 11))[0].tolist()}")
+    print(f"half width of the interval {((table.high - table.low) / 2 / table.middle).median():.1%} (median)")
+    print(f"median wall {table.wall.median():.1f} s")
+
+
+if __name__ == "__main__":
+    main()
