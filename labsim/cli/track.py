@@ -118,7 +118,7 @@ def track_one(
     source: Path, folder: Path, given: dict[str, Any], progress: options.Progress | None = None
 ) -> tuple[dict[str, Any], str]:
     """Files of one drop; its summary and the lines for people."""
-    request = read_request(source, given)
+    request, diameter = read_request(source, given), _read_diameter(given)
     if given["ruler"] is not None:
         take_ruler(request, given["ruler"], 1e-3 * given["ruler_step_mm"])
     seen: video.Tracking | None = None
@@ -139,7 +139,7 @@ def track_one(
             progress=progress,
         )
         found = seen.track
-        take_from_video(request, seen, _read_diameter(given))
+        take_from_video(request, seen, diameter)
     curve = _fit(request, found, followed=seen is not None)
     written = write_files(folder, request, found, curve, frames, seen)
     summary = summarise(request, found, curve, seen)
