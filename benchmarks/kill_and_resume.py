@@ -38,7 +38,7 @@ REUSED = {"track": "reused", "ct": "reused"}
 
 def make_campaign(folder: Path, command: str) -> Path:
     """Two drops; for track and ct with two videos and two scans, which calibrate would simulate for minutes."""
-    sys.path.insert(0, str(ROOT / "tests" / "faults"))
+    sys.path.insert(0, str(ROOT / "tests" / "shared"))
     from small_campaign import add_videos_and_scans, copy_campaign
 
     made = copy_campaign(folder)

@@ -58,7 +58,7 @@ def main() -> None:
     parser.add_argument("--full", action="store_true")
     parser.add_argument("arguments", nargs="*")
     given = parser.parse_args()
-    sys.path.insert(0, str(ROOT / "tests" / "faults"))
+    sys.path.insert(0, str(ROOT / "tests" / "shared"))
     from small_campaign import copy_campaign
 
     with tempfile.TemporaryDirectory() as name:
