@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from attempts import attempt
+from campaign_files import SCAN, fill_in
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from small_campaign import copy_campaign
@@ -37,6 +38,8 @@ SHARES = {
     "made_by": 0.06,
 }
 counts: Counter[tuple[str, int]] = Counter()
+QUICK = "--geometry planar --set material.bulk_modulus_Pa=4500 --spacing-um 125 --speed-m-s 0.3".split()
+SHORT = ["--time-ms", "0.01"]
 
 NASTY = st.sampled_from(
     [
@@ -119,13 +122,19 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scan = campaign / "ct" / "C01"
     record = phantom.write(scan / "slices")
     bead, grey = record.projectile, record.calibration
-    (scan / "scan.toml").write_text(
-        f'[projectile]\nshape = "sphere"\nradius_mm = {bead.tip_radius * 1e3!r}\nmass_mg = {bead.mass * 1e6!r}\n'
-        "[drop]\nspeed_m_s = 0.8\nspeed_sigma_m_s = 0.04\n"
-        f'[scan]\nslices = "slices"\nvoxel_um = {record.voxel * 1e6!r}\nfirst_slice = "top"\nbits = {record.bits}\n'
-        f"[calibration]\ngrey_air = {grey.grey_air!r}\ngrey_per_density = {grey.grey_per_density!r}\n"
-        f"density_solid_kg_m3 = {grey.density_solid!r}\n"
+    text = fill_in(
+        SCAN,
+        radius_mm=bead.tip_radius * 1e3,
+        mass_mg=bead.mass * 1e6,
+        speed_m_s=0.8,
+        speed_sigma_m_s=0.04,
+        voxel_um=record.voxel * 1e6,
+        bits=record.bits,
+        grey_air=grey.grey_air,
+        grey_per_density=grey.grey_per_density,
+        density_solid_kg_m3=grey.density_solid,
     )
+    (scan / "scan.toml").write_text(text)
     (scan / "slices" / "scan_rec.log").write_text(
         "[System]\nScanner=SkyScan1172\n[Acquisition]\nImage Pixel Size (um)=37.0\n[Reconstruction]\n"
         "Pixel Size (um)=37.0\nSections Count=64\nResult Image Width (pixels)=56\nResult Image Height (pixels)=56\n"
@@ -159,10 +168,6 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = attempt(["simulate", *QUICK, *SHORT, "-o", home / "result", "--quiet"], home / "result", "")
     assert made.status == 0, made.said
     return home
-
-
-QUICK = "--geometry planar --set material.bulk_modulus_Pa=4500 --spacing-um 125 --speed-m-s 0.3".split()
-SHORT = ["--time-ms", "0.01"]
 
 
 @pytest.fixture
@@ -253,13 +258,36 @@ def test_campaigns(inputs: Path, root: Path) -> None:
     run()
 
 
-def test_tracks(inputs: Path, root: Path) -> None:
-    @mutants("track", st.lists(st.one_of(TEXT, BYTES), min_size=1, max_size=3))
+# kind -> sound input, its name in the folder of the case, the file that is changed, the command
+TEXTS = {
+    "track": ("campaign/drops/D05", "drop", "drop/track.csv", ["track", "drop", "-o", "out", "--quiet"]),
+    "log": ("campaign/ct/C01", "scan", "scan/slices/scan_rec.log", ["ct", "scan", "-o", "out", "--quiet"]),
+    "model": (
+        "model.toml",
+        "model.toml",
+        "model.toml",
+        ["simulate", *QUICK, *SHORT, "--model", "model.toml", "-o", "out", "--store", "out/store", "--quiet"],
+    ),
+    # run.json, from which rerun takes a command to run
+    "made_by": ("result", "result", "result/run.json", ["rerun", "result", "-o", "out", "--quiet"]),
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_one_text_file(kind: str, inputs: Path, root: Path) -> None:
+    source, name, file, arguments = TEXTS[kind]
+
+    @mutants(kind, st.lists(st.one_of(TEXT, BYTES), min_size=1, max_size=3))
     def run(changes: list) -> None:
-        folder = fresh(root, inputs / "campaign" / "drops" / "D05", "drop")
+        folder = fresh(root, inputs / source, name)
         for change in changes:
-            change_file(folder / "drop" / "track.csv", change)
-        judge("track", attempt(["track", "drop", "-o", "out", "--quiet"], folder), changes)
+            change_file(folder / file, change)
+        found = attempt(arguments, folder)
+        if kind == "made_by" and found.status == 1:  # different, and says so
+            assert "Traceback" not in found.said and not found.strays
+            counts[kind, 1] += 1
+        else:
+            judge(kind, found, changes)
 
     run()
 
@@ -295,17 +323,6 @@ def test_slices(inputs: Path, root: Path) -> None:
     run()
 
 
-def test_logs(inputs: Path, root: Path) -> None:
-    @mutants("log", st.lists(st.one_of(TEXT, BYTES), min_size=1, max_size=2))
-    def run(changes: list) -> None:
-        folder = fresh(root, inputs / "campaign" / "ct" / "C01", "scan")
-        for change in changes:
-            change_file(folder / "scan" / "slices" / "scan_rec.log", change)
-        judge("log", attempt(["ct", "scan", "-o", "out", "--quiet"], folder), changes)
-
-    run()
-
-
 def test_stores(inputs: Path, root: Path) -> None:
     """Verified, and read back by the command that would use it: the same numbers, from a sound file or a new run."""
     sound = next((inputs / "store").glob("??/*.h5"))
@@ -324,36 +341,6 @@ def test_stores(inputs: Path, root: Path) -> None:
             counts["store", 2] += 1
         else:
             judge("store", found, changes)
-
-    run()
-
-
-def test_models(inputs: Path, root: Path) -> None:
-    @mutants("model", st.lists(st.one_of(TEXT, BYTES), min_size=1, max_size=3))
-    def run(changes: list) -> None:
-        folder = fresh(root, inputs / "model.toml", "model.toml")
-        for change in changes:
-            change_file(folder / "model.toml", change)
-        arguments = ["simulate", *QUICK, *SHORT, "--model", "model.toml", "-o", "out", "--quiet"]
-        judge("model", attempt([*arguments, "--store", "out/store"], folder), changes)
-
-    run()
-
-
-def test_results(inputs: Path, root: Path) -> None:
-    """run.json, from which ``rerun`` takes a command to run."""
-
-    @mutants("made_by", st.lists(st.one_of(TEXT, BYTES), min_size=1, max_size=3))
-    def run(changes: list) -> None:
-        folder = fresh(root, inputs / "result", "result")
-        for change in changes:
-            change_file(folder / "result" / "run.json", change)
-        found = attempt(["rerun", "result", "-o", "out", "--quiet"], folder)
-        if found.status == 1:  # different, and says so
-            assert "Traceback" not in found.said and not found.strays
-            counts["made_by", 1] += 1
-        else:
-            judge("made_by", found, changes)
 
     run()
 
