@@ -37,6 +37,7 @@ SERIES = (
     (LARGE, 2.5, 0.30, 16.3e-3),
 )
 SCANS = (0.75, 0.37)  # m/s
+REST = 2.0  # of the stopping time: a bead is scanned after it has come to rest, some of its depth above the deepest point
 
 
 def dust_of(hidden: dict, p_m: float) -> Dust:
@@ -56,7 +57,7 @@ def body_of(hidden: dict, radius: float, mass: float, sphere: bool = False) -> B
     return Body(radius=radius, mass=mass, sphere=sphere, **terms)
 
 
-def label(hidden: dict) -> dict:
+def name_hidden(hidden: dict) -> dict:
     """What is hidden, in the words of the labelled campaigns' truth.json; words of its own where those have none."""
     words = {"rate_n": "raten", "shear_factor": "yf", "gas_pressure": "pgas", "friction": "mu_f"}
     dust = {words.get(key, key): value for key, value in hidden.get("dust", {}).items()}
@@ -136,7 +137,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
         mass = BEAD * SMALL**3
         dust = dust_of(hidden, own)
         body = body_of(hidden, SMALL, mass * measure.get("mass", 1.0), sphere=True)
-        result = run_drop(dust, body, speed, replace(NUMERICS, height=5.0), stop_factor=1.0)
+        result = run_drop(dust, body, speed, replace(NUMERICS, height=5.0), stop_factor=REST)
         blur = ct["blur_mm"] * 1e-3 if "blur_mm" in ct else None
         scans[f"C{k + 1:02d}"] = write_scan(
             folder / "ct" / f"C{k + 1:02d}", result, dust, SMALL, mass, speed, SMALL / NUMERICS.cells, rng,
@@ -147,7 +148,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
         shutil.rmtree(out / name)
     os.replace(folder, out / name)
     return name, {
-        **label(hidden),
+        **name_hidden(hidden),
         "name": name,
         "drops": drops,
         "scans": scans,
@@ -201,7 +202,7 @@ def main() -> None:
     truth = json.loads(truth_file.read_text()) if truth_file.exists() else {}
     for h in chosen:
         if h["name"] in truth:
-            truth[h["name"]].update(label(h))
+            truth[h["name"]].update(name_hidden(h))
     jobs = [(h, arguments.out) for h in chosen if h["name"] not in truth]
     began = time.perf_counter()
     with ProcessPoolExecutor(arguments.workers, mp_context=get_context("spawn")) as pool:

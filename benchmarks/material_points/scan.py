@@ -17,6 +17,7 @@ SURFACE_SLICE = 22
 GREY_AIR = 12.0
 GREY_PER_DENSITY = 0.16
 NOISE = 3.0  # grey levels
+FULL = 0.85  # share of the room that points fill inside the dust, at least
 BLUR = 0.8  # voxels, point spread of a sound scan within a slice
 GLASS = 2540.0  # kg/m^3
 
@@ -53,12 +54,13 @@ def map_density(result: Result, dust: Dust, radius: float, h: float):
         indexing="ij",
     )
     everywhere = deposit(r.ravel(), z.ravel(), 2 * np.pi * r.ravel() * fine**2, h, shape, z0)
-    in_bead = np.hypot(r, z + result.stopping_depth - radius) < radius
+    in_bead = np.hypot(r, z + result.depth[-1] - radius) < radius
     bead = deposit(r[in_bead], z[in_bead], 2 * np.pi * r[in_bead] * fine**2, h, shape, z0)
     room = np.maximum(everywhere - bead, 0.05 * everywhere)
     with np.errstate(invalid="ignore"):
         phi = np.where(volume > 0.0, dust_volume / volume, 0.0)
-    density = phi * SOLID * np.minimum(volume / room, 1.0)
+    # points that flowed leave gaps and overlaps of some percent; only the free surface is emptier than that
+    density = phi * SOLID * np.minimum(volume / (FULL * room), 1.0)
     # the last cells at the domain's edges are incomplete
     nodes_z = z0 + np.arange(shape[1]) * h
     undisturbed = np.where(nodes_z < 0.0, fill_factor_at(dust, np.maximum(-nodes_z, 0.0)) * SOLID, 0.0)
@@ -74,6 +76,7 @@ def write_scan(
     """Write scan.toml and the slices; blur in m, the standard deviation of a Gaussian."""
     (folder / "slices").mkdir(parents=True)
     axis = SIZE / 2 + rng.uniform(-5.0, 5.0, 2)  # x, y
+    tip = float(result.depth[-1])  # where it rests, above the deepest point it reached
     y, x, k = np.meshgrid(np.arange(SIZE), np.arange(SIZE), np.arange(SLICES), indexing="ij")
     r = np.hypot(x - axis[0], y - axis[1]) * VOXEL
     z = (SURFACE_SLICE - k) * VOXEL
@@ -82,7 +85,7 @@ def write_scan(
         z > 0.0, 0.0, np.where(z == 0.0, 0.5, 1.0) * fill_factor_at(dust, np.maximum(-z, 0.0)) * SOLID
     )
     density = np.where(np.isnan(density), beyond, density)
-    across = np.sqrt(np.maximum(radius**2 - (z + result.stopping_depth - radius) ** 2, 0.0))
+    across = np.sqrt(np.maximum(radius**2 - (z + tip - radius) ** 2, 0.0))
     covered = np.where(across > 0.0, np.clip(0.5 - (r - across) / VOXEL, 0.0, 1.0), 0.0)
     density = covered * GLASS + (1.0 - covered) * density
     # a sound scan is sharp from slice to slice, as the labelled ones are; a bad one is blurred all round
@@ -115,4 +118,4 @@ grey_per_density = {GREY_PER_DENSITY:.4f}   # grey levels per kg/m3; levels abov
 density_solid_kg_m3 = {SOLID}
 """
     )
-    return {"axis_px": list(map(float, axis)), "tip_z_mm": -result.stopping_depth * 1e3, "true_v0": speed}
+    return {"axis_px": list(map(float, axis)), "tip_z_mm": -tip * 1e3, "true_v0": speed}
