@@ -8,6 +8,7 @@ from ..records import DecelerationCurve, FloatArray, Measured
 from .segments import STANDARD_GRAVITY
 
 MOST_LAGS = 12
+MOST_ALIKE = 0.95
 CHANCE = 2.5  # standard deviations of a correlation between independent residuals
 
 
@@ -33,23 +34,29 @@ def fit_gravity(
     return Measured(gravity, float(np.hypot(sigma, scale * gravity)))
 
 
-def measure_alikeness(residual: FloatArray) -> float:
+def measure_alikeness(residual: FloatArray, fitted: int) -> float:
     """By how much the variance of a slow quantity grows because residuals of neighbouring frames are alike; 1 if not.
 
-    1 + 2 Σ ρ_k over the lags up to the first correlation that chance could make. residual : (n,) in units of the error bars.
+    The larger of 1 + 2 Σ ρ_k over the lags up to the first correlation that chance could make, and of (1 + ρ)/(1 - ρ) for errors
+    that fade by ρ from frame to frame: the ``fitted`` parameters take their slow part out of the residuals, and with it about
+    (fitted + (fitted + 2) ρ) / n from ρ_1. residual : (n,) in units of the error bars.
     """
     n = len(residual)
     if n < 20:
         return 1.0
     centred = residual - residual.mean()
     total = float(np.sum(centred**2))
-    growth = 1.0
+    growth, first = 1.0, 0.0
     for lag in range(1, min(MOST_LAGS, n // 4) + 1):
         correlation = float(np.sum(centred[lag:] * centred[:-lag])) / total
         if correlation < CHANCE / np.sqrt(n):
             break
+        first = first or correlation
         growth += 2.0 * correlation
-    return growth
+    if not first:
+        return 1.0
+    fading = min((first + fitted / n) / max(1.0 - (fitted + 2) / n, 0.5), MOST_ALIKE)
+    return max(growth, (1.0 + fading) / (1.0 - fading))
 
 
 def check_drop_height(curve: DecelerationCurve, height: Measured) -> str | None:

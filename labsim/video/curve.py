@@ -85,7 +85,8 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
         warnings.append(
             f"rows scatter {np.sqrt(scale):.2f} times their error bars about the fit; errors were raised"
         )
-    alike = measure_alikeness(((depth - motion.evaluate(time)[0]) / error)[use])
+    left = ((depth - motion.evaluate(time)[0]) / error)[use]
+    alike = measure_alikeness(left, left.size - motion.freedom)
     if alike > 1.0:
         warnings.append(
             f"neighbouring frames err alike: uncertainties of all figures were raised {np.sqrt(alike):.1f} times"

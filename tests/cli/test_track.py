@@ -103,19 +103,23 @@ def test_damaged_videos_speak_with_one_voice(tmp_path) -> None:
             data[int(rng.integers(40, len(data)))] = int(rng.integers(0, 256))
         if number > 2:
             data = data[: len(data) // number]
-        (tmp_path / f"damaged{number}.mp4").write_bytes(bytes(data))
+        (tmp_path / f"in{number}").mkdir()
+        (tmp_path / f"in{number}" / "damaged.mp4").write_bytes(bytes(data))
     program = (
         "import sys\n"
         "from labsim.cli import main\n"
-        "for file in sys.argv[1:]:\n"
+        "for file in sys.argv[2:]:\n"
         "    try:\n"
-        "        main(['track', file, '--fps', '10000', '-o', file + '.out', '-q'])\n"
+        "        main(['track', file, '--fps', '10000', '-o', sys.argv[1] + '/out', '-q'])\n"
         "    except SystemExit as stop:\n"
         "        assert stop.code in (0, 2, None), stop.code\n"
     )
-    files = sorted(tmp_path.glob("*.mp4"))
+    files = sorted(tmp_path.glob("in*/damaged.mp4"))
     done = subprocess.run(
-        [sys.executable, "-c", program, *map(str, files)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", program, str(tmp_path), *map(str, files)],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     lines = (done.stdout + done.stderr).splitlines()
     assert all(line.startswith("error: ") and ".mp4: " in line for line in lines), lines
