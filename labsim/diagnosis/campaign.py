@@ -29,7 +29,7 @@ WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer e
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
 MOST_EXPLORED = 3
-MOST_SETTLED = 3  # large effects with runs at three strengths about them
+MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -184,9 +184,9 @@ def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: 
 
 
 def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
-    """The fits with the best of those that are large made once more with runs at three strengths about them.
+    """The fits with the best of those that are large made once more with runs at three strengths and amplitudes about them.
 
-    One or two strengths lead there; what tells two large effects apart is how they bend with p_m.
+    One or two lead there; what tells two large effects apart is how they bend with p_m.
     """
     top = max((fit.evidence for fit in fits), default=0.0)
     settled, again = [], 0

@@ -75,8 +75,8 @@ def fit_hypothesis(
 ) -> Fit:
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
-    coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths about the estimate, not
-    one or two: what a large effect changes bends with p_m. nuisances : a fit whose nuisances are the starting values.
+    coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
+    estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
     """
     models = copy.deepcopy(nuisances.models if nuisances is not None else bench.models)
     speeds = list(nuisances.scan_speeds if nuisances is not None else (scan.stated for scan in bench.scans))
@@ -241,7 +241,7 @@ def _ask(
         (name, amplitude, index)
         for name in hypothesis
         if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench, name, values[name], coarse=coarse)
+        for amplitude in amplitude_nodes(bench, name, values[name], coarse=coarse, around=around)
         for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, around=around))
     ]
     if wanted:

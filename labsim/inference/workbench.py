@@ -349,8 +349,11 @@ def screening_node(log_p_m: float) -> int:
     return 2 * round(0.5 * (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
 
 
-def amplitude_nodes(bench: Workbench, name: str, amplitude: float, *, coarse: bool = False) -> list[float]:
-    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits."""
+def amplitude_nodes(
+    bench: Workbench, name: str, amplitude: float, *, coarse: bool = False, around: bool = False
+) -> list[float]:
+    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits; ``around``: one
+    more beyond them, so that the curve between two does not depend on the side that the estimate came from."""
     parameter = bench.effects[name].amplitudes[0]
     step, (low, high) = parameter.step, parameter.limits
     place = amplitude / step
@@ -362,7 +365,7 @@ def amplitude_nodes(bench: Workbench, name: str, amplitude: float, *, coarse: bo
         sign = math.copysign(1.0, place)
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
         below = [m for m in ladder if m < abs(place)] or [1.0]
-        wanted = [sign * below[-1], sign * above[0]]
+        wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
     nodes = []
     for m in wanted:
         value = float(np.clip(parameter.null + m * step, low, high)) - parameter.null
