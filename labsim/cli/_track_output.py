@@ -136,8 +136,11 @@ def tell(summary: dict[str, Any], curve: DecelerationCurve | None, folder: Path,
     if summary["pixel_size_m"] is not None:
         pixel = Measured(summary["pixel_size_m"], summary["pixel_size_m_sigma"])
         source = summary["pixel_size_source"]
-        unit = "µm (stated)" if source == "stated" else f"µm (from the {source}, in the errors above)"
-        lines.append(line("pixel size", pixel, 1e6, unit, 3))
+        where = source if source == "stated" else f"from the {source}"
+        if pixel.sigma > 0.0:
+            lines.append(line("pixel size", pixel, 1e6, f"µm ({where}, in the errors above)", 3))
+        else:
+            lines.append(f"  {'pixel size':22s} {1e6 * pixel.value:.3f} µm ({where}, without an uncertainty)")
     lines += [f"warning: {text}" for text in summary["warnings"]]
     lines.append(f"written to {folder}: {', '.join(written)}")
     return "\n".join(lines)

@@ -21,7 +21,7 @@ from .explore import explore, is_open
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Score, Screening, screen, screen_pairs
-from .shapes import lay_out_shapes, merge_variants
+from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
@@ -29,6 +29,8 @@ WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer e
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
 MOST_EXPLORED = 3
+MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for the others
+NARROW = 15.0  # the same between effects whose order more runs may change
 MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
@@ -76,7 +78,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     fits = confirm_singles(bench, nominal, screening)
     explored: dict[str, Fit] = {}
     if is_open(bench, nominal, fits, screening):
-        explored = explore(bench, nominal, screening)
+        explored = explore(bench, nominal, screening, fits)
         fits = confirm_explored(bench, nominal, fits, explored)
     fits = settle_best(bench, fits)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
@@ -162,8 +164,12 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
         and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
     for score in costly:
+        variants = sum(cause(fit.hypothesis[0]) == cause(score.name) for fit in fits)
+        if score.log_bayes < top - CLOSE or variants >= MOST_VARIANTS:  # far behind what was simulated since
+            continue
         with suppress(ExtrapolationError):  # its runs lead nowhere: no candidate
             fits.append(_fit_from_score(bench, nominal, score))
+            top = max(top, fits[-1].evidence - nominal.evidence)
     return fits
 
 
@@ -189,18 +195,20 @@ def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
     One or two lead there; what tells two large effects apart is how they bend with p_m.
     """
     top = max((fit.evidence for fit in fits), default=0.0)
-    settled, again = [], 0
+    settled: list[Fit] = []
+    again: set[str] = set()  # one variant of a cause
     for fit in sorted(fits, key=lambda fit: -fit.evidence):
         name = fit.hypothesis[0]
         effect = bench.effects[name]
         if (
-            again < MOST_SETTLED
-            and fit.evidence > top - CLOSE
+            len(again) < MOST_SETTLED
+            and cause(name) not in again
+            and fit.evidence > top - NARROW
             and bench.costs_runs(name)
             and effect.kind != "numerics"
             and abs(fit.values[name]) > abs(effect.amplitudes[0].step)
         ):
-            again += 1
+            again.add(cause(name))
             with suppress(ExtrapolationError):
                 fit = fit_hypothesis(
                     bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit

@@ -17,6 +17,7 @@ from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit, with_probe
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from .screen import Screening
+from .shapes import cause
 
 REACH = 2.5  # factor on p_m
 KINDS = ("material", "contact")  # that p_m can make up for; samples are seen in the scans
@@ -28,28 +29,38 @@ FIRST_STEPS = 4
 
 
 def is_open(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
-    """Whether the nominal model fails, and either nothing explains the data or only what p_m can be traded for."""
+    """Whether the nominal model fails, and either nothing explains the data or only what p_m can be traded for.
+
+    Not where one effect has left every other, simulated or only screened, far behind.
+    """
     best = screening.scores[0].log_bayes if screening.scores else -math.inf
     if best <= PROMISING and goodness_of_fit(nominal) >= FAILED:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
     if found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < EXPLAINED:
         return True
-    return bench.effects[found.hypothesis[0]].kind in KINDS
+    name = found.hypothesis[0]
+    behind = [fit.evidence for fit in fits if cause(fit.hypothesis[0]) != cause(name)]
+    behind += [nominal.evidence + s.log_bayes for s in screening.scores if cause(s.name) != cause(name)]
+    ahead = found.evidence - max([nominal.evidence, *behind])
+    return bench.effects[name].kind in KINDS and ahead < HOPELESS
 
 
-def explore(bench: Workbench, nominal: Fit, screening: Screening) -> dict[str, Fit]:
-    """Best coarse fit of every effect that p_m can make up for, by name."""
+def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence[Fit] = ()) -> dict[str, Fit]:
+    """Best coarse fit of every effect that p_m can make up for, by name; of variants in shape the stated one.
+
+    fits : found so far.
+    """
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     starts = [nominal.log_p_m]
     for shift in (math.log(REACH), -math.log(REACH)):
         if low <= nominal.log_p_m + shift <= high:
             starts.append(nominal.log_p_m + shift)
     found: dict[str, Fit] = {}
-    top = nominal.evidence
+    top = max([nominal.evidence, *(fit.evidence for fit in fits)])
     for score in screening.scores:
         name = score.name
-        if not bench.costs_runs(name) or bench.effects[name].kind not in KINDS:
+        if not bench.costs_runs(name) or bench.effects[name].kind not in KINDS or cause(name) != name:
             continue
         for start in starts:
             try:
