@@ -61,8 +61,20 @@ def test_a_model_that_cannot_be_at_work_here_is_refused(place):
         calibrate(campaign, store=laws.LawStore(place / "store"), model=model)
 
 
-def test_nested_sampling_agrees_with_the_formula_for_the_evidence(place):
-    campaign = read_campaign(laws.write_campaign(place / "campaign-evidence", rate=0.05))
-    found = calibrate(campaign, ("p_m", "strength_rate"), store=laws.LawStore(place / "store"))
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "pixel_scale",
+        pytest.param(
+            "strength_rate",
+            marks=pytest.mark.xfail(
+                strict=True, reason="docs/inference.md: six drops leave p_m and rate a bent posterior"
+            ),
+        ),
+    ],
+)
+def test_nested_sampling_agrees_with_the_formula_for_the_evidence(place, effect):
+    campaign = read_campaign(laws.write_campaign(place / f"campaign-evidence-{effect}", rate=0.05))
+    found = calibrate(campaign, ("p_m", effect), store=laws.LawStore(place / "store"))
     nested, error = integrate_evidence(found.bench, found.fit)
     assert nested == pytest.approx(found.fit.evidence, abs=0.5 + 3 * error)
