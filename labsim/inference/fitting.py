@@ -236,7 +236,7 @@ def _ask(
     coarse: bool,
     around: bool,
 ) -> None:
-    bench.require_base(enclosing_nodes(log_p_m))
+    bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range))
     wanted = [
         (name, amplitude, index)
         for name in hypothesis

@@ -173,7 +173,7 @@ class Workbench:
 
     def require_about(self, name: str, log_p_m: float) -> None:
         """The base about a strength and a fingerprint of one effect there."""
-        self.require_base(enclosing_nodes(log_p_m))
+        self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range))
         index = screening_node(log_p_m)
         wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self, name, 0.0)]
         self.require_changes(wanted, f"{name} at another p_m", coarse=True)
@@ -326,9 +326,18 @@ def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: 
     raise InferenceError("simulation", "projectile", "has no runs")
 
 
-def enclosing_nodes(log_p_m: float) -> list[int]:
-    """The four strength nodes about a value."""
-    below = math.floor((log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
+def enclosing_nodes(log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.inf)) -> list[int]:
+    """The four strength nodes about a value; none beyond those that enclose the range (Pa), where soft dust costs most."""
+
+    def place(log_strength: float) -> float:
+        return (log_strength - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
+
+    below = math.floor(place(log_p_m))
+    low, high = p_m_range
+    if math.isfinite(high):
+        below = min(below, math.ceil(place(math.log(high))) - 2)
+    if low > 0.0:
+        below = max(below, math.floor(place(math.log(low))) + 1)
     return [below - 1, below, below + 1, below + 2]
 
 

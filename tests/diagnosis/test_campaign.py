@@ -40,7 +40,9 @@ def test_the_hidden_cause_is_named(name, store):
         assert found.p_value > 0.05
     else:
         assert found.p_value < 0.01
-        if found.gain.rms_nominal > found.gain.rms_noise:  # a wrong scale is on the held-out drop's own free fall too
+        if (
+            found.gain.rms_nominal > found.gain.rms_noise
+        ):  # a wrong scale is on the held-out drop's own free fall too
             assert found.gain.fraction_removed > 0.8
         assert found.gain.log_score_difference > 4
 

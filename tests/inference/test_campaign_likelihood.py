@@ -13,6 +13,7 @@ from labsim.inference.likelihood import solve_globals
 from labsim.inference.observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
 from labsim.inference.posterior import measure_residual, sample
 from labsim.inference.scans import Block
+from labsim.inference.workbench import enclosing_nodes
 from labsim.records import Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
 
@@ -175,3 +176,13 @@ def test_free_fall_has_its_own_gravity():
     instant = Instant(0.0, math.log(0.5), 0.0)
     early = predict_depth(sine_code(), np.array([-1e-3]), instant, 1.0, 1.0, 0.0)[0]
     assert early == pytest.approx(-0.5e-3 + 0.5 * STANDARD_GRAVITY * 1e-6, rel=1e-9)
+
+
+def test_no_base_is_simulated_beyond_the_range_of_p_m():
+    """Nodes are 1000 Pa times powers of two; 300 to 6000 Pa lie between 250 and 8000 Pa."""
+    limits = (300.0, 6000.0)
+    assert enclosing_nodes(math.log(1300.0), limits) == [-1, 0, 1, 2]
+    assert enclosing_nodes(math.log(1300.0)) == [-1, 0, 1, 2]
+    assert enclosing_nodes(math.log(150.0), limits) == [-2, -1, 0, 1]
+    assert enclosing_nodes(math.log(9000.0), limits) == [0, 1, 2, 3]
+    assert enclosing_nodes(math.log(150.0)) == [-4, -3, -2, -1]
