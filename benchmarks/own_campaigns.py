@@ -34,9 +34,8 @@ from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 
 CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
-SCANS = [
-    CAMPAIGN.parents[1] / "ct" / "labelled_scans" / name for name in ("p01-C01", "p05-C02")
-]  # frames, masks and errors of maps
+LABELLED_SCANS = CAMPAIGN.parents[1] / "ct" / "labelled_scans"
+SCANS = [LABELLED_SCANS / name for name in ("p01-C01", "p05-C02")]  # frames, masks and errors of maps
 NOT_HIDDEN = ("resolution", "planar_geometry", "gravity")  # no truth of their own here
 VOXEL = 40e-6  # m
 OFF_DEFAULT = 0.8  # hidden shapes are this share of the stated one

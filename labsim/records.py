@@ -221,13 +221,11 @@ class DecelerationCurve:
     stopping_time: Measured  # s, contact to the first v = 0
     warnings: tuple[str, ...] = ()
     stopping_time_2_percent: Measured | None = None  # s, contact to v = 2 % of the impact speed
-    apparent_gravity: Measured | None = (
-        None  # m/s^2 of the free flight; off where pixel scale or frame rate is
-    )
+    # m/s^2 of the free flight; off where pixel scale or frame rate is
+    apparent_gravity: Measured | None = None
     rebound_speed: Measured | None = None  # m/s upwards, None where the projectile comes to rest
-    residual: FloatArray | None = (
-        None  # px, (m,) every frame of the track minus the fit, NaN where not fitted
-    )
+    # px, (m,) every frame of the track minus the fit, NaN where not fitted
+    residual: FloatArray | None = None
     used: npt.NDArray[np.bool_] | None = None  # (m,) frames of the track that the fit stands on
     degree: int | None = None  # of the polynomial of the deceleration
 

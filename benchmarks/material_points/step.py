@@ -26,6 +26,20 @@ def spline(x):
 
 
 @njit(inline="always", fastmath=True)
+def reach_nodes(r, z, z0, inv_h):
+    """First of the three nodes along r and z, distances to them in cells, weights, and slopes of the weights (1/m)."""
+    x = r * inv_h
+    y = (z - z0) * inv_h
+    i0 = math.floor(x - 0.5)
+    j0 = math.floor(y - 0.5)
+    fx = x - i0
+    fy = y - j0
+    gx = ((fx - 1.5) * inv_h, -2.0 * (fx - 1.0) * inv_h, (fx - 0.5) * inv_h)
+    gy = ((fy - 1.5) * inv_h, -2.0 * (fy - 1.0) * inv_h, (fy - 0.5) * inv_h)
+    return i0, j0, fx, fy, spline(fx), spline(fy), gx, gy
+
+
+@njit(inline="always", fastmath=True)
 def surface_of(r, z, tip, radius, is_sphere):
     """Signed distance to the projectile's surface and the outward normal there; its lowest point is at ``tip``."""
     up = z - (tip + radius)
@@ -102,18 +116,9 @@ def advance(
         pz[:] = 0.0
         for k in range(n):
             p = points[k]
-            x = p[R] * inv_h
-            y = (p[Z] - z0) * inv_h
-            i0 = math.floor(x - 0.5)
-            j0 = math.floor(y - 0.5)
+            i0, j0, fx, fy, wx, wy, gx, gy = reach_nodes(p[R], p[Z], z0, inv_h)
             if i0 + 3 >= nr or j0 < 0 or j0 + 2 >= nz:
                 continue
-            fx = x - i0
-            fy = y - j0
-            wx = spline(fx)
-            wy = spline(fy)
-            gx = ((fx - 1.5) * inv_h, -2.0 * (fx - 1.0) * inv_h, (fx - 0.5) * inv_h)
-            gy = ((fy - 1.5) * inv_h, -2.0 * (fy - 1.0) * inv_h, (fy - 0.5) * inv_h)
             mp = p[MASS]
             v_dt = dt * mp / (p[PHI] * solid)
             srr = v_dt * (p[SRR] - p[PRESSURE])
@@ -160,13 +165,11 @@ def advance(
                             u -= approach * nx
                             v -= approach * ny
                             if friction > 0.0:
-                                slide_r = u - 0.0
-                                slide_z = v - vb
-                                slide = math.sqrt(slide_r * slide_r + slide_z * slide_z)
+                                slide = math.sqrt(u * u + (v - vb) * (v - vb))
                                 if slide > 0.0:
                                     keep = max(0.0, 1.0 + friction * approach / slide)
-                                    u = slide_r * keep
-                                    v = vb + slide_z * keep
+                                    u *= keep
+                                    v = vb + (v - vb) * keep
                             if i == 1:
                                 u = 0.0
                             impulse -= mi * (v - v_before)
@@ -195,18 +198,9 @@ def advance(
         c2_max = 0.0
         for k in range(n):
             p = points[k]
-            x = p[R] * inv_h
-            y = (p[Z] - z0) * inv_h
-            i0 = math.floor(x - 0.5)
-            j0 = math.floor(y - 0.5)
+            i0, j0, fx, fy, wx, wy, gx, gy = reach_nodes(p[R], p[Z], z0, inv_h)
             if i0 + 3 >= nr or j0 < 0 or j0 + 2 >= nz:
                 continue
-            fx = x - i0
-            fy = y - j0
-            wx = spline(fx)
-            wy = spline(fy)
-            gx = ((fx - 1.5) * inv_h, -2.0 * (fx - 1.0) * inv_h, (fx - 0.5) * inv_h)
-            gy = ((fy - 1.5) * inv_h, -2.0 * (fy - 1.0) * inv_h, (fy - 0.5) * inv_h)
             u = v = crr = crz = czr = czz = lrr = lrz = lzr = lzz = 0.0
             for a in range(3):
                 dx = (a - fx) * h

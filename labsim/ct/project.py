@@ -52,12 +52,12 @@ def project(
     half = 0.5 * np.sqrt(area)
     half_r = np.minimum(half, np.maximum(r, 1e-9))
     half_z = area / (4 * half_r)
-    sides = (r - half_r, r + half_r, z - half_z, z + half_z)
-    seen = _see(_deposit(*sides, mass, edges_r, edges_z), edges_r, edges_z, blur, scan_map)
-    if of_particles:
-        filled = _see(_deposit(*sides, mass / phi, edges_r, edges_z), edges_r, edges_z, blur, scan_map)
+    contents = [mass, mass / phi] if of_particles else [mass]
+    laid = _deposit(r - half_r, r + half_r, z - half_z, z + half_z, contents, edges_r, edges_z)
+    seen, *filled = (_see(each, edges_r, edges_z, blur, scan_map) for each in laid)
+    if filled:
         mean = float(mass.sum() / (mass / phi).sum())
-        seen = (seen + LEAST_FILLED * mean) / (filled + LEAST_FILLED)
+        seen = (seen + LEAST_FILLED * mean) / (filled[0] + LEAST_FILLED)
     seen = scale * seen
     hidden = ~np.isfinite(scan_map.filling_factor) if masked is None else masked
     return np.where(hidden, np.nan, seen)
@@ -104,37 +104,40 @@ def _fine_edges(scan_map: FillingMap) -> tuple[FloatArray, FloatArray]:
 
 
 def _deposit(
-    r_low: FloatArray, r_high: FloatArray, z_low: FloatArray, z_high: FloatArray, mass: FloatArray,
+    r_low: FloatArray, r_high: FloatArray, z_low: FloatArray, z_high: FloatArray, contents: list[FloatArray],
     edges_r: FloatArray, edges_z: FloatArray,
-) -> FloatArray:  # fmt: skip
-    """Mass per fine bin (nz, nr): rectangles spread over the bins, across r in proportion to r as rings hold it."""
+) -> list[FloatArray]:  # fmt: skip
+    """Each of the contents per fine bin (nz, nr): rectangles spread over the bins, across r in proportion to r as rings hold it.
+
+    The first of the contents is the mass; where there is none a particle is left out.
+    """
     nr, nz = len(edges_r) - 1, len(edges_z) - 1
     step_r, step_z = edges_r[1] - edges_r[0], edges_z[1] - edges_z[0]
-    keep = (r_low < edges_r[-1]) & (z_high > edges_z[0]) & (z_low < edges_z[-1]) & (mass > 0)
-    r_low, r_high, z_low, z_high, mass = (a[keep] for a in (r_low, r_high, z_low, z_high, mass))
+    keep = (r_low < edges_r[-1]) & (z_high > edges_z[0]) & (z_low < edges_z[-1]) & (contents[0] > 0)
+    r_low, r_high, z_low, z_high, *contents = (a[keep] for a in (r_low, r_high, z_low, z_high, *contents))
     first_r = np.floor(r_low / step_r).astype(np.int64)
     first_z = np.floor((z_low - edges_z[0]) / step_z).astype(np.int64)
     wide = int(np.max(np.floor(r_high / step_r) - first_r, initial=0)) + 1
     tall = int(np.max(np.floor((z_high - edges_z[0]) / step_z) - first_z, initial=0)) + 1
     ring = r_high**2 - r_low**2
-    share_r = np.empty((wide, len(mass)))
+    share_r = np.empty((wide, len(ring)))
     for i in range(wide):
         low = np.maximum((first_r + i) * step_r, r_low)
         high = np.minimum((first_r + i + 1) * step_r, r_high)
         share_r[i] = np.where(high > low, high**2 - low**2, 0.0) / ring
-    result = np.zeros(nz * nr)
+    results = [np.zeros(nz * nr) for _ in contents]
     for k in range(tall):
         low = np.maximum(edges_z[0] + (first_z + k) * step_z, z_low)
         high = np.minimum(edges_z[0] + (first_z + k + 1) * step_z, z_high)
-        part = np.maximum(high - low, 0.0) / (z_high - z_low) * mass
+        part = np.maximum(high - low, 0.0) / (z_high - z_low)
         row = first_z + k
         for i in range(wide):
             column = first_r + i
             inside = (row >= 0) & (row < nz) & (column < nr)
-            result += np.bincount(
-                (row[inside] * nr + column[inside]), (part * share_r[i])[inside], minlength=nz * nr
-            )
-    return result.reshape(nz, nr)
+            bins = row[inside] * nr + column[inside]
+            for result, content in zip(results, contents, strict=True):
+                result += np.bincount(bins, (part * content * share_r[i])[inside], minlength=nz * nr)
+    return [result.reshape(nz, nr) for result in results]
 
 
 @lru_cache(maxsize=32)

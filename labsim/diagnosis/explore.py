@@ -42,7 +42,7 @@ def is_open(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Scre
     return bench.effects[found.hypothesis[0]].kind in KINDS
 
 
-def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence[Fit] = ()) -> dict[str, Fit]:
+def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence[Fit]) -> dict[str, Fit]:
     """Best coarse fit of every effect that p_m can make up for, by name; of variants in shape the stated one.
 
     fits : found so far.

@@ -43,7 +43,7 @@ class Family:
 class Request:
     """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    cells : spacings in a tip radius; coarser ones than the base's at the few speeds that fingerprints need.
+    cells : spacings in a tip radius, at the few speeds that fingerprints need; None for all speeds at the base's own spacing.
     """
 
     variant: str
@@ -135,8 +135,7 @@ class RunGrid:
         settings, places = [], []
         for request, number in missing:
             family = self.families[number]
-            coarse = request.cells is not None and request.cells < self.cells
-            positions = family.few if coarse else range(len(family.speeds))
+            positions = range(len(family.speeds)) if request.cells is None else family.few
             for position in positions:
                 setting = self.setting(
                     family, family.speeds[position], strength_node(request.index), request.cells

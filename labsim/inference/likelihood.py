@@ -29,9 +29,8 @@ from .observe import STANDARD_GRAVITY, ObservedDrop
 BIN = 8  # frames of free fall averaged into one point
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
-USUAL_SWIFTNESS = (
-    1.85  # ln of speed over root of gravity and radius, where p_m makes up for all of the solver's error
-)
+# ln of speed over root of gravity and radius, where p_m makes up for all of the solver's error
+USUAL_SWIFTNESS = 1.85
 MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from ..ct.project import project
 from ..ct.reduce import ReducedScan
 from ..effects import Instrument
-from ..records import FloatArray, Scan
+from ..records import FillingMap, FloatArray, Scan
 from ..sph import DropRun
 from .blocks import Block
 from .forward import ResponseTable
@@ -70,20 +70,34 @@ def observe_scan(reduced: ReducedScan) -> ObservedScan:
     )
 
 
-def encode_scan_run(run: DropRun, observed: ObservedScan) -> FloatArray:
-    """(1 + n,): ln D and the filling factor on the compared cells, through the point spread that the scan itself shows."""
-    dust, reduced = run.particles, observed.reduced
-    seen = project(
+def see_dust(
+    run: DropRun,
+    frame: FillingMap,
+    blur: float,
+    *,
+    scale: float = 1.0,
+    masked: np.ndarray | None = None,
+) -> FloatArray:
+    """Filling factor of a run's dust on a map's cells, (nz, nr), moved so that its deepest tip lies where the map's bead ends."""
+    dust = run.particles
+    return project(
         dust.r,
         dust.z,
         dust.volume,
         dust.filling_factor,
-        reduced.map,
-        blur=reduced.point_spread,
-        shift=run.penetration_depth - reduced.map.tip_depth,
-        masked=~observed.cells,
+        frame,
+        blur=blur,
+        scale=scale,
+        shift=run.penetration_depth - frame.tip_depth,
+        masked=masked,
         of_particles=True,
     )
+
+
+def encode_scan_run(run: DropRun, observed: ObservedScan) -> FloatArray:
+    """(1 + n,): ln D and the filling factor on the compared cells, through the point spread that the scan itself shows."""
+    reduced = observed.reduced
+    seen = see_dust(run, reduced.map, reduced.point_spread, masked=~observed.cells)
     return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
 
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..ct.project import project
 from ..ct.reduce import ReducedScan
 from ..effects import Effect, Instrument, list_effects, list_places
 from ..errors import SimulationError
@@ -27,6 +26,7 @@ from .grid import interpolation_weights, set_nominal_drop
 from .measure import Measurements
 from .observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
 from .runs import Progress, RunStore
+from .scans import see_dust
 from .undisturbed import UndisturbedDust
 
 TRUTH_CELLS, TRUTH_SCAN_CELLS = 6, 10
@@ -199,19 +199,10 @@ def _scan(
         setting = effect.apply(setting, hidden.values, place)
         instrument = effect.apply_to_instrument(instrument, hidden.values, place)
     run = simulate(setting)
-    dust, tip = run.particles, run.penetration_depth - LIFT * rng.exponential()
+    tip = run.penetration_depth - LIFT * rng.exponential()
     frame = replace(template.map, z=template.map.z - (tip - template.map.tip_depth), tip_depth=tip)
-    seen = project(
-        dust.r,
-        dust.z,
-        dust.volume,
-        dust.filling_factor,
-        frame,
-        blur=math.hypot(template.point_spread, instrument.ct_blur),
-        shift=run.penetration_depth - tip,
-        scale=instrument.ct_scale,
-        of_particles=True,
-    )
+    blur = math.hypot(template.point_spread, instrument.ct_blur)
+    seen = see_dust(run, frame, blur, scale=instrument.ct_scale)
     noise = np.nan_to_num(frame.sigma) * rng.standard_normal(seen.shape)
     return replace(template, map=replace(frame, filling_factor=seen + noise))
 

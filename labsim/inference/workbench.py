@@ -62,9 +62,9 @@ class Workbench:
     shape_evidence: dict[str, float] = field(default_factory=dict)
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
     model: Model | None = None  # what the nominal model is extended by
-    # what the tables hold already: encoding a run means seeing it through every scan
+    # what the tables hold already, and codes of the nominal model: encoding a run means seeing it through every scan
     _filled: set[tuple[int, int, str, int | None]] = field(default_factory=set, repr=False)
-    _plain: dict[tuple[int, int, int], list[tuple[ResponseTable, FloatArray | None]]] = field(
+    _plain: dict[tuple[int, int, int | None], list[tuple[ResponseTable, FloatArray | None]]] = field(
         default_factory=dict, repr=False
     )
 
@@ -87,26 +87,27 @@ class Workbench:
             for table, encode in tables
         ]
 
+    def _encode_plain(
+        self, number: int, index: int, cells: int | None
+    ) -> list[tuple[ResponseTable, FloatArray | None]]:
+        """Codes of the nominal model, encoded once."""
+        if (number, index, cells) not in self._plain:
+            self._plain[number, index, cells] = self._encode(number, index, "", cells)
+        return self._plain[number, index, cells]
+
     def _fill_base(self, number: int, index: int) -> None:
-        if (number, index, "", None) in self._filled:
-            return
-        self._filled.add((number, index, "", None))
-        for table, codes in self._encode(number, index, "", None):
+        for table, codes in self._encode_plain(number, index, None):
             if codes is not None:
                 table.base[index] = codes
 
-    def _fill_change(self, number: int, index: int, name: str, amplitude: float, cells: int) -> None:
+    def _fill_change(self, number: int, index: int, name: str, amplitude: float, cells: int | None) -> None:
         variant = self._variant(name, amplitude)
         if (number, index, variant, cells) in self._filled:
             return
         self._filled.add((number, index, variant, cells))
-        before = self._plain.get((number, index, cells))
-        if before is None:
-            before = self._plain[number, index, cells] = self._encode(number, index, "", cells)
-        for (table, codes), (_, plain) in zip(
-            self._encode(number, index, variant, cells), before, strict=True
-        ):
-            kept = table.changes if cells >= self.grid.cells else table.fingerprints
+        before, after = self._encode_plain(number, index, cells), self._encode(number, index, variant, cells)
+        for (table, codes), (_, plain) in zip(after, before, strict=True):
+            kept = table.changes if cells is None else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
             if codes is not None and plain is not None:
                 entry[amplitude] = codes - plain
@@ -161,7 +162,7 @@ class Workbench:
         self, wanted: Sequence[tuple[str, float, int]], text: str = "effects", *, coarse: bool = False
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
-        cells = min(COARSE_CELLS, self.grid.cells) if coarse else self.grid.cells
+        cells = COARSE_CELLS if coarse and self.grid.cells > COARSE_CELLS else None
         plain = [Request("", None, index, cells) for index in sorted({index for _, _, index in wanted})]
         changed = [
             Request(self._variant(name, a), self.change(name, a), index, cells) for name, a, index in wanted
@@ -302,7 +303,7 @@ def extend(bench: Workbench, model: Model) -> None:
 
 
 def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Nodes that enclose the speeds with a margin, and those of them that changes are simulated at."""
+    """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
     slowest, fastest = min(speeds) / margin, max(speeds) * margin
     nodes = speed_nodes(slowest, fastest)
     return nodes, few_positions(nodes, slowest, fastest)
@@ -326,24 +327,25 @@ def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: 
     raise InferenceError("simulation", "projectile", "has no runs")
 
 
+def place_strength(log_p_m: float) -> float:
+    """Where a strength lies among the nodes: an integer at a node."""
+    return (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
+
+
 def enclosing_nodes(log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.inf)) -> list[int]:
     """The four strength nodes about a value; none beyond those that enclose the range (Pa), where soft dust costs most."""
-
-    def place(log_strength: float) -> float:
-        return (log_strength - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
-
-    below = math.floor(place(log_p_m))
+    below = math.floor(place_strength(log_p_m))
     low, high = p_m_range
     if math.isfinite(high):
-        below = min(below, math.ceil(place(math.log(high))) - 2)
+        below = min(below, math.ceil(place_strength(math.log(high))) - 2)
     if low > 0.0:
-        below = max(below, math.floor(place(math.log(low))) + 1)
+        below = max(below, math.floor(place_strength(math.log(low))) + 1)
     return [below - 1, below, below + 1, below + 2]
 
 
 def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -> list[int]:
     """The nearest strength node, and the next one where the value lies well between two; ``around``: both neighbours too."""
-    place = (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
+    place = place_strength(log_p_m)
     near = round(place)
     if around:
         return [near - 1, near, near + 1]
@@ -355,7 +357,7 @@ def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -
 def screening_node(log_p_m: float) -> int:
     """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
     whose nominal p_m an effect has driven off still share their fingerprints' runs."""
-    return 2 * round(0.5 * (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO))
+    return 2 * round(0.5 * place_strength(log_p_m))
 
 
 def amplitude_nodes(

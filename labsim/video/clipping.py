@@ -14,9 +14,8 @@ from scipy.special import ndtr
 from ..records import FloatArray
 
 CONTOUR = 0.6  # opacity that every usable edge reaches, however bright the background
-ABOVE_PLATEAU = (
-    0.06  # opacity; what is nearer to the plateau of clipped pixels is a mean over clipped and whole ones
-)
+# opacity; what is nearer to the plateau of clipped pixels is a mean over clipped and whole ones
+ABOVE_PLATEAU = 0.06
 ACROSS = 7.0  # px on either side of the contour
 LEAST_PIXELS = 60
 
