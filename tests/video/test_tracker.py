@@ -310,6 +310,20 @@ def test_saturated_background(record_property, bright) -> None:
     assert any("saturated" in text for text in seen.track.warnings)
 
 
+@pytest.mark.parametrize("shift", [0, 4])
+def test_saturated_words_of_sixteen_bits(record_property, shift) -> None:
+    """T11: twelve bits saved in words of sixteen saturate at their own ceiling, whichever bits of the word are used."""
+    recording, pictures, rows, _ = record(11, bright=300.0, vignette=0.0, bits=12)
+    words = [picture << shift for picture in pictures]
+    seen = follow_projectile(make_frames(words), surface_row=recording.surface_row)
+    error = seen.track.tip_row - rows
+    record_property(f"T11 12 bit << {shift} rms / bound", np.nanstd(error) / bound(recording))
+    assert seen.scene.ceiling == 4095 << shift
+    assert any("saturated" in text for text in seen.track.warnings)
+    assert np.nanstd(error) <= 2.0 * bound(recording)
+    assert abs(np.nanmean(error)) < 0.05
+
+
 def test_little_contrast(record_property) -> None:
     """T12: at C/s = 5 the error bars hold 60-76 % of the errors and none lies beyond 4.5; below 4 it is refused."""
     scores = []
