@@ -25,7 +25,7 @@ NOTEBOOKS = {
     "seed_experiment": (
         3,
         [
-            r"378 stored runs",
+            r"508 stored runs",
             r"ratio at equal speed 3\.00",
             r"stored stopping time (1\.00|0\.99)\d",
             r"nominal: T_s ratio 2\.4",
