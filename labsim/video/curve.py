@@ -80,7 +80,9 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     if outliers:
         frames = ", ".join(str(f) for f in track.frame[trusted][~keep & window][:8])
         many = "s" if outliers > 1 else ""
-        warnings.append(f"{outliers} outlier{many} left out (frame{many} {frames}{' …' if outliers > 8 else ''})")
+        warnings.append(
+            f"{outliers} outlier{many} left out (frame{many} {frames}{' …' if outliers > 8 else ''})"
+        )
     scale = motion.chi_square / max(motion.freedom, 1)
     if scale > 1.0 + 3.0 * np.sqrt(2.0 / max(motion.freedom, 1)):
         warnings.append(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured, Track
-from .bead import follow_bead, is_bead, needs_disc
+from .bead import follow_bead, is_bead
 from .direction import check_direction, straighten
 from .following import Progress
 from .frames import Frames
@@ -157,8 +157,8 @@ def _follow_bare_bead(
     frames: Frames, scene: Scene, usable: np.ndarray, outlines: list[Outline | None], warnings: list[str]
 ) -> Positions | None:
     """Positions of a bare bead, whose lowest point stands for the tip; None where it is better served by a template."""
-    bead = follow_bead(frames, scene, usable)
-    if bead is None or not needs_disc(outlines, bead.smear):
+    bead = follow_bead(frames, scene, usable, outlines)
+    if bead is None:
         return None
     sigma = raise_to_scatter(bead.y, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0)
     if frames.lossy:
