@@ -30,9 +30,6 @@ NUMERICAL_DEPTH = 0.03  # of the depth: slow, shallow drops differ by up to 4 % 
 # beside the tip, and the overshoot of a compaction front, which is alike over the whole zone
 NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
-NUMERICAL_CHANGE = (
-    0.10  # of what an effect changes of the map: what interpolation and spacing leave where it is large
-)
 STRENGTH = 0.15  # of ln p_m by which the zones of two codes differ, most under shallow drops
 CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
 
