@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -33,6 +34,12 @@ def shared_store() -> str:
     from labsim.inference.runs import default_store
 
     return str(default_store())
+
+
+@pytest.fixture
+def record_property(record_property: Callable[[str, object], None]) -> Callable[[str, object], None]:
+    """As text, which is what the file gets: a worker cannot send numpy's numbers to the process that writes it."""
+    return lambda name, value: record_property(name, str(value))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
