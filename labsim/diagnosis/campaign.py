@@ -232,12 +232,19 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
         if lead.evidence < max(nominal.evidence, ranked[0].evidence - CLOSE) + LEAST_GAIN:
             continue
         name = lead.hypothesis[0]
-        again = screen(bench, lead, np.random.default_rng(0), [n for n in bench.effects if n != name])
+        # finer runs of every partner would cost more than they say
+        partners = [n for n, effect in bench.effects.items() if n != name and effect.kind != "numerics"]
+        again = screen(bench, lead, np.random.default_rng(0), partners)
         for score in again.scores[:MOST_PAIRS]:
             if score.log_bayes > LEAST_GAIN and (score.name, name) not in starts:
                 starts[name, score.name] = lead
     top = ranked[0].evidence - nominal.evidence if ranked else 0.0
-    for pair, log_bayes in screen_pairs(bench, screening)[:MOST_JOINT]:
+    joint = [
+        (pair, log_bayes)
+        for pair, log_bayes in screen_pairs(bench, screening)
+        if not any(bench.effects[name].kind == "numerics" for name in pair)
+    ]
+    for pair, log_bayes in joint[:MOST_JOINT]:
         known = any(set(pair) == set(other) for other in starts)
         if not known and log_bayes > max(top, 0.0) + LEAST_GAIN:
             starts[pair] = nominal
