@@ -40,6 +40,7 @@ LOG = (
     "outside",
 )
 STEPS_AT_ONCE = 64
+LEAST = 0.1  # of the skin: a list that allows less is made anew
 EIGHT = np.uint64(WIDTH)
 BLOCK = np.uint64(
     128
@@ -58,7 +59,7 @@ def advance(
     s, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
     allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap,
     wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
-    law, extras, strength, tension,
+    stopped, law, extras, strength, tension,
 ):  # fmt: skip
     """Up to ``steps`` steps, or until a point has moved ``allowed`` from ``origin``. Returns how many were made.
 
@@ -196,7 +197,12 @@ def advance(
         row[7] = body[3]
         row[8] = last[8] + dt * contact[0]
         row[9] = last[9] - dt * outside * body[1]
-        if far > 0 or abs(body[0] - body_origin) > allowed or body[1] >= 0.0 or not (abs(force) < 1.0e300):
+        if (
+            far > 0
+            or abs(body[0] - body_origin) > allowed
+            or (body[1] >= 0.0 and not stopped)
+            or not (abs(force) < 1.0e300)
+        ):
             return step + 1
     return steps
 
@@ -248,6 +254,7 @@ def evolve(
         material.shear_factor, setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
     )  # fmt: skip
     plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
+    wall_weight = solve_wall_weight(numerics.smoothing)  # a millisecond
     extras = () if plain else (1,)  # two types, so two compiled versions
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[0], -body[1]
@@ -268,22 +275,26 @@ def evolve(
         state[rows.Z, n : n + source.size] = state[rows.Z, source]
         neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
         builds += 1
-        origin = state[[rows.X, rows.Z], :n].copy()
-        near, inner, body_origin = _find_near(state[:, :n], projectile, setting.spacing, body[0], skin)
-        fresh = True
-        while fresh and body[2] < limit:
+        allowed, begun = 0.45 * skin, state[rows.X, :n].copy()
+        fresh = False
+        while allowed > LEAST * skin and body[2] < limit:
+            if not fresh:
+                origin = state[[rows.X, rows.Z], :n].copy()
+                near, inner, body_origin = _find_near(
+                    state[:, :n], projectile, setting.spacing, body[0], skin
+                )
             if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
             left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
                 state, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
-                neighbours.start, neighbours.list, origin, 0.45 * skin, steps, log, made + 1, body,
+                neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
                 projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
-                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness,
+                numerics.contact_gap, wall_weight, numerics.contact_stiffness,
                 material.contact_friction, setting.side_friction * force_scale,
-                *depth_law, *speed_law, law, extras, strength, tension,
+                *depth_law, *speed_law, stop_step is not None, law, extras, strength, tension,
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():
                 raise _blown_up(setting, made + max(done, 0), body[2])
@@ -293,12 +304,12 @@ def evolve(
                 stop_step = made
                 limit = min(limit, body[2] * (1 + setting.after_stop))
                 at_stop = state[:, :n].copy()
-            if stop_step is not None:
-                fresh = fresh or (
-                    body[1] >= 0.0
-                    and np.abs(state[[rows.X, rows.Z], :n] - origin).max() < 0.45 * skin
-                    and abs(body[0] - body_origin) < 0.45 * skin
-                )
+            if not fresh:
+                state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
+                state[rows.Z, n : n + source.size] = state[rows.Z, source]
+                allowed = min(0.45 * skin, neighbours.spare(state[rows.X], state[rows.Z]))
+                if source.size:  # no point without an image may come so near to the mirror that it needs one
+                    allowed = min(allowed, 2 * skin - np.abs(state[rows.X, :n] - begun).max())
             if watch is not None:
                 _fill_elastic(setting, state[:, :n])
                 watch(float(body[2]), state[:, :n])
