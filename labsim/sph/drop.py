@@ -281,7 +281,7 @@ def evolve(
             if not fresh:
                 origin = state[[rows.X, rows.Z], :n].copy()
                 near, inner, body_origin = _find_near(
-                    state[:, :n], projectile, setting.spacing, body[0], skin
+                    state[:, :n], projectile, setting.spacing, body[0], skin, axisymmetric
                 )
             if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
@@ -361,20 +361,18 @@ def _fill_elastic(setting: DropSetting, state: FloatArray) -> None:
 
 
 def _find_near(
-    state: FloatArray, projectile: Projectile, spacing: float, tip: float, skin: float
+    state: FloatArray, projectile: Projectile, spacing: float, tip: float, skin: float, axisymmetric: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Particles that can come within two spacings of the projectile, or to the axis, before the next list; and the tip now."""
-    x, z = np.abs(state[rows.X]), state[rows.Z]
+    x, z = state[rows.X], state[rows.Z]
     margin = 2 * spacing + skin
-    above = z - tip - projectile.tip_radius
-    beside = (above > 0) & (projectile.tip == "hemisphere")
-    distance = np.where(beside, x, np.hypot(x, above)) - projectile.tip_radius
     state[rows.DISTANCE] = 1.0e9
-    return (
-        np.nonzero(distance < margin)[0].astype(np.uint32),
-        np.nonzero(x < spacing)[0].astype(np.uint32),
-        float(tip),
-    )
+    near = np.nonzero(z > tip - margin)[0]
+    across, above = np.abs(x[near]), z[near] - tip - projectile.tip_radius
+    beside = (above > 0) & (projectile.tip == "hemisphere")
+    distance = np.where(beside, across, np.hypot(across, above)) - projectile.tip_radius
+    inner = np.nonzero(np.abs(x) < spacing)[0] if axisymmetric else np.zeros(0)
+    return near[distance < margin].astype(np.uint32), inner.astype(np.uint32), float(tip)
 
 
 def _find_images(x: FloatArray, near: float, mirrors: tuple[float, ...]) -> tuple[np.ndarray, FloatArray]:

@@ -38,7 +38,7 @@ def list_neighbours(n, x, z, xs, zs, reach, x0, z0, size_x, size_z, nx, nz, cell
     length used, or -1 where ``out`` may be too short. Every candidate is written and kept by moving on: no branch to guess."""
     reach2 = reach * reach
     used = 0
-    span = int(math.ceil(reach / size_z))
+    span = math.ceil(reach / size_z)
     for i in range(n):
         start[i] = used
         xi, zi = x[i], z[i]
