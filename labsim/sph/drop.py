@@ -18,7 +18,7 @@ from ..records import FloatArray, Projectile
 from . import particles as rows
 from ._jit import compiled_entry
 from .gradients import bound_step, carry_stress, deform, mirror_axis, renormalise
-from .lines import ROOM, WIDTH, make_lines, write_lines
+from .lines import ROOM, WIDTH, make_lines, make_rows, write_lines
 from .materials.porous_dust import elastic_energy, tabulate_strengths, update_stress
 from .neighbours import Neighbours
 from .pairs import sum_forces, sum_gradients
@@ -56,7 +56,7 @@ BLOCK = np.uint64(
 
 @compiled_entry
 def advance(
-    s, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
+    s, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
     allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap,
     wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
     stopped, law, extras, strength, tension,
@@ -72,7 +72,6 @@ def advance(
     plain = len(extras) == 0  # known to the compiler
     stop = start[1:]
     contact = np.zeros(2)
-    nearby, beyond = np.zeros((8, ROOM)), np.zeros((8, ROOM))
     for step in range(steps):
         worst = 0.0
         for i in range(n):
@@ -241,7 +240,8 @@ def evolve(
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
     neighbours = Neighbours(2 * h, skin)
-    state = np.zeros((dust.shape[0], n + WIDTH))
+    state = make_rows(dust.shape[0], n + WIDTH)
+    nearby, beyond = make_rows(WIDTH, ROOM), make_rows(WIDTH, ROOM)
     front, back = make_lines(n + WIDTH), make_lines(n + WIDTH)
     state[:, :n] = dust
     per_unit = 2 * math.pi if axisymmetric else 1.0
@@ -268,9 +268,9 @@ def evolve(
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
         if n + source.size + WIDTH > state.shape[1]:
             front, back = (make_lines(n + source.size + 64 + WIDTH) for _ in range(2))
-            state = np.concatenate(
-                [state[:, :n], np.zeros((state.shape[0], source.size + 64 + WIDTH))], axis=1
-            )
+            larger = make_rows(state.shape[0], n + source.size + 64 + WIDTH)
+            larger[:, :n] = state[:, :n]
+            state = larger
         state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
         state[rows.Z, n : n + source.size] = state[rows.Z, source]
         neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
@@ -288,7 +288,7 @@ def evolve(
             left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
+                state, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
                 neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
                 projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
                 setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,

@@ -1,7 +1,8 @@
 """Who is near whom: a cell grid and a list with a skin, kept until two particles may have come nearer by the skin.
 
-Lists hold unsigned indices (signed ones make the compiler insert wrap-around code and stop vectorising) and are
-padded to a multiple of eight with the particle itself, which contributes exactly nothing to a gradient.
+Lists hold where the neighbours' lines begin (``lines.py``), unsigned (signed numbers make the compiler insert wrap-around
+code and stop vectorising) and are padded to a multiple of eight with the particle itself, which contributes exactly
+nothing to a gradient.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 import numpy as np
 
 from ._jit import compiled_entry
+from .lines import WIDTH
 
 
 @compiled_entry
@@ -33,8 +35,8 @@ def sort_into_cells(n, x, z, x0, z0, size_x, size_z, nx, nz, cell_start, order, 
 
 
 @compiled_entry
-def list_neighbours(n, x, z, xs, zs, reach, x0, z0, size_x, size_z, nx, nz, cell_start, order, start, out):
-    """Neighbours within ``reach`` of particles 0..n-1 among all sorted points (xs, zs in the order of ``order``). Returns the
+def list_neighbours(n, x, z, xs, zs, reach, x0, z0, size_x, size_z, nx, nz, cell_start, line, start, out):
+    """Neighbours within ``reach`` of particles 0..n-1 among all sorted points: xs, zs and where their lines begin. Returns the
     length used, or -1 where ``out`` may be too short. Every candidate is written and kept by moving on: no branch to guess."""
     reach2 = reach * reach
     used = 0
@@ -56,10 +58,10 @@ def list_neighbours(n, x, z, xs, zs, reach, x0, z0, size_x, size_z, nx, nz, cell
             for k in range(first, last):
                 dx = xi - xs[k]
                 dz = zi - zs[k]
-                out[used] = order[k]
+                out[used] = line[k]
                 used += 1 if dx * dx + dz * dz < reach2 else 0
         while used % 8 != 0:
-            out[used] = i
+            out[used] = WIDTH * i
             used += 1
     start[n] = used
     return used
@@ -120,9 +122,9 @@ class Neighbours:
         sort_into_cells(m, x, z, x0, z0, *size, *cells, cell_start, order, np.empty(m, dtype=np.int64))
         if self.start.size != n + 1:
             self.start = np.empty(n + 1, dtype=np.int64)
-        xs, zs = x[order], z[order]
+        xs, zs, line = x[order], z[order], WIDTH * order
         while list_neighbours(
-            n, x, z, xs, zs, reach, x0, z0, *size, *cells, cell_start, order, self.start, self.list
+            n, x, z, xs, zs, reach, x0, z0, *size, *cells, cell_start, line, self.start, self.list
         ) < 0:  # fmt: skip
             self.list = np.empty(int(self.list.size * 1.3) + 40 * n, dtype=np.uint32)
         self.then = x[:m].copy(), z[:m].copy()
