@@ -102,8 +102,8 @@ def sum_forces(
                 fz = f * dz
                 du = ui - near[2, k]
                 dw = wi - near[3, k]
-                jump = du * dx + dw * dz
-                jump -= half * (
+                approach = du * dx + dw * dz
+                jump = approach - half * (
                     ((ixx + beyond[2, k]) * dx + (ixz + beyond[3, k]) * dz) * dx
                     + (izz + beyond[4, k]) * dz * dz
                 )
@@ -111,7 +111,7 @@ def sum_forces(
                 q = (wti + beyond[0, k]) * (linear * (ci + beyond[1, k]) + square * abs(mu)) * mu
                 sx += (axx + beyond[5, k] - q) * fx + (axz + beyond[6, k]) * fz
                 sz += (azx + beyond[7, k]) * fx + (azz + near[5, k] - q) * fz
-                power += q * (fx * du + fz * dw)
+                power += q * f * approach
             first += count
         fx_out[i] = norm * area[i] * sx
         fz_out[i] = norm * area[i] * sz
