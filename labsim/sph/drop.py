@@ -56,8 +56,9 @@ BLOCK = np.uint64(
 
 @compiled_entry
 def advance(
-    s, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
-    allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap,
+    s, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
+    start, neighbour, origin, allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, viscosity,
+    hold_apart, artificial_stress, gap,
     wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
     stopped, law, extras, strength, tension,
 ):  # fmt: skip
@@ -141,8 +142,8 @@ def advance(
             write_lines(back, k, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ], s[MXX], s[MXZ], s[MZX])
         sum_forces(
             np.uint64(0), np.uint64(n), x, z, u, w, area, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ],
-            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, alpha, beta, affine,
-            s[FX], s[FZ], s[HEAT],
+            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, viscosity,
+            hold_apart, artificial_stress, s[FX], s[FZ], s[HEAT],
         )  # fmt: skip
         if axisymmetric:
             for i in range(n):
@@ -255,6 +256,10 @@ def evolve(
     )  # fmt: skip
     plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
     wall_weight = solve_wall_weight(numerics.smoothing)  # a millisecond
+    hold_apart = (1,) if numerics.artificial_stress > 0.0 else ()
+    part = 1 - 0.5 / numerics.smoothing
+    artificial_stress = (numerics.artificial_stress, 1 / (part**4 * (5 - 4 * part)))
+    viscosity = (numerics.alpha, numerics.beta, numerics.affine)
     extras = () if plain else (1,)  # two types, so two compiled versions
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[0], -body[1]
@@ -288,10 +293,10 @@ def evolve(
             left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
-                neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
+                state, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near,
+                inner, body_origin, neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
                 projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
-                setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
+                setting.gravity, setting.spacing, h, numerics.courant, viscosity, hold_apart, artificial_stress,
                 numerics.contact_gap, wall_weight, numerics.contact_stiffness,
                 material.contact_friction, setting.side_friction * force_scale,
                 *depth_law, *speed_law, stop_step is not None, law, extras, strength, tension,
