@@ -17,7 +17,7 @@ from ..errors import SimulationError
 from ..records import FloatArray, Projectile
 from . import particles as rows
 from ._jit import compiled_entry
-from .gradients import bound_step, carry_stress, deform, mirror_axis, renormalise
+from .gradients import bound_step, carry_stress, deform, find_fronts, mirror_axis, renormalise
 from .lines import ROOM, WIDTH, make_lines, make_rows, write_lines
 from .materials.porous_dust import elastic_energy, tabulate_strengths, update_stress
 from .neighbours import Neighbours
@@ -57,10 +57,9 @@ BLOCK = np.uint64(
 @compiled_entry
 def advance(
     s, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
-    start, neighbour, origin, allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, viscosity,
-    hold_apart, artificial_stress, gap,
-    wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
-    stopped, law, extras, strength, tension,
+    start, neighbour, origin, allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant,
+    viscosity, front_rate, hold_apart, artificial_stress, gap, wall_weight, contact_stiffness, friction,
+    side_friction, depth_knots, depth_force, speed_knots, speed_force, stopped, law, extras, strength, tension,
 ):  # fmt: skip
     """Up to ``steps`` steps, or until a point has moved ``allowed`` from ``origin``. Returns how many were made.
 
@@ -123,6 +122,20 @@ def advance(
             s[MXX], s[MXZ], s[MZX], s[MZZ], s[LXX], s[LXZ], s[LZX], s[LZZ], s[SXX], s[SZZ], s[SXZ], s[PRESSURE],
             density, s[WORK],
         )  # fmt: skip
+        if front_rate > 0.0:
+            find_fronts(
+                np.uint64(0),
+                np.uint64(n),
+                axisymmetric,
+                front_rate,
+                h,
+                u,
+                ring,
+                sound,
+                s[LXX],
+                s[LZZ],
+                s[SHEAR],
+            )
         if images > 0:
             for k in (AREA, WEIGHT, SOUND, LXX, LZZ, MXX, MZZ):
                 mirror_axis(n, images, source, s[k], 1.0)
@@ -296,8 +309,8 @@ def evolve(
                 state, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near,
                 inner, body_origin, neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
                 projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
-                setting.gravity, setting.spacing, h, numerics.courant, viscosity, hold_apart, artificial_stress,
-                numerics.contact_gap, wall_weight, numerics.contact_stiffness,
+                setting.gravity, setting.spacing, h, numerics.courant, viscosity, numerics.front,
+                hold_apart, artificial_stress, numerics.contact_gap, wall_weight, numerics.contact_stiffness,
                 material.contact_friction, setting.side_friction * force_scale,
                 *depth_law, *speed_law, stop_step is not None, law, extras, strength, tension,
             )  # fmt: skip

@@ -18,6 +18,9 @@ class Numerics:
     alpha: float = 0.5  # artificial viscosity, on what two particles' own velocity gradients leave of a jump
     beta: float = 0.0  # its quadratic part
     affine: float = 1.0  # share of the linear velocity field taken out of the jump; 0 is Monaghan's viscosity
+    front: float = (
+        0.0  # compression h |div v| / c along one line from which on the jump stays whole; 0: nowhere
+    )
     artificial_stress: float = (
         0.0  # of the tension of a pair, holds it apart; for bodies without a tensile limit, dust has one
     )
