@@ -3,8 +3,10 @@
     python benchmarks/seed_study.py [--store FOLDER] [--minutes 30] [--only nominal planar ...]
 
 Runs what is missing (the order is that of ``plan``, most wanted first), stops at the time given, writes every run that
-there is to docs/seed-study.csv and prints the tables of the page from that file. Start it again and it goes on.
-``--tables`` only prints. The round drops take four spacings a tip radius, which is coarse: ``--only error`` measures it.
+there is to docs/seed-study.csv and prints the tables of the page from that file. Start it again and it goes on. A row whose
+run the store lacks, because the solver has changed since, stays as it is: ``solver`` says whose it is.
+``--tables`` only prints; ``--again`` runs a sample of the rows with the solver of today and prints how far they are off.
+The round drops take four spacings a tip radius, which is coarse: ``--only error`` measures it.
 """
 
 from __future__ import annotations
@@ -56,6 +58,42 @@ LEVELS = {  # effect -> values of its parameters that are run besides null
     "projectile_mass": ({"factor": 1.3}, {"factor": 0.8}),
     "tensile_strength": ({"factor": 3.0},),
 }
+TOGETHER: tuple[
+    tuple[dict[str, float], float], ...
+] = (  # amplitudes and p_m (Pa) that the tables call best, run as they stand
+    ({"hard_floor": 1.81e-3}, 427.0),
+    ({"shear_strength": 0.793}, 753.0),
+    ({"filling_factor": 0.142}, 692.0),
+    ({"side_friction": 0.09}, 312.0),
+    ({"strength_slope": 0.715}, 909.0),
+    ({"contact_friction": 0.12}, 427.0),
+    ({"pore_gas": 200.0}, 506.0),
+    ({"tensile_strength": 1.69}, 306.0),
+    ({"pore_gas": 556.0, "hard_floor": 1.73e-3}, 393.0),
+    ({"shear_strength": 0.523, "side_friction": 0.444}, 769.0),
+    ({"shear_strength": 0.457, "tensile_strength": 3.0}, 769.0),
+    ({"surface_crust": -0.0255, "shear_strength": 0.894}, 722.0),
+    ({"shear_strength": 0.4, "contact_friction": 0.8}, 1894.0),
+    ({"gravity": 9.81, "shear_strength": 0.4}, 3199.0),
+)
+AGAIN = (  # group, case or beginning of it, radius in mm, speed in m/s, p_m in Pa: the sample that is run again
+    ("nominal", "", 0.5, 0.197, 250.0),
+    ("nominal", "", 0.5, 0.591, 500.0),
+    ("nominal", "", 0.5, 1.77, 1000.0),
+    ("nominal", "", 0.5, 0.07, 2000.0),
+    ("bead", "", 0.5, 0.8, 1000.0),
+    ("scaling", "", 1.5, 0.345, 500.0),
+    ("planar", "", 0.5, 0.197, 1300.0),
+    ("planar", "", 0.5, 0.591, 650.0),
+    ("planar", "", 0.5, 1.034, 5200.0),
+    ("planar_K0", "300000", 0.55, 0.65, 1300.0),
+    ("gravity", "9.81", 1.5, 0.197, 250.0),
+    ("side_friction", "0.35", 0.5, 1.033, 1000.0),
+    ("hard_floor", "0.002", 0.5, 1.033, 250.0),
+    ("shear_strength", "0.4", 1.5, 0.344, 1000.0),
+    ("surface_crust", "-0.0255", 0.5, 0.591, 250.0),
+    ("pore_gas", "5000", 1.5, 0.197, 1000.0),
+)
 
 
 @dataclass(frozen=True)
@@ -135,6 +173,7 @@ def plan() -> Iterator[Task]:
             yield Task("error", f"{cells}", round_drop(SMALL, speed, 500.0, cells=cells))
 
     yield from _plan_equal_speed()
+    yield from _plan_together()
 
 
 LENGTHS = {
@@ -172,9 +211,48 @@ def _plan_effects() -> Iterator[Task]:
                         yield Task(case, label, effects[case].apply(drop, levels[number], place))
 
 
+def name_together(chosen: dict[str, float]) -> str:
+    return " + ".join(f"{name} {value:g}" for name, value in chosen.items())
+
+
+def _plan_together() -> Iterator[Task]:
+    """The best single effects and pairs as they stand: the four drops and the scanned bead; pairs at two more p_m."""
+    campaign = replace(reference_campaign(), gravity=0.0)
+    effects, place = list_effects(campaign), list_places(campaign)["D01"]
+    for chosen, best in TOGETHER:
+        case = name_together(chosen)
+        for p_m in (best,) if len(chosen) == 1 else (best, 0.7 * best, 1.4 * best):
+            drops = [
+                round_drop(radius, round(speed_at(momentum, radius), 3), p_m)
+                for radius in (SMALL, LARGE)
+                for momentum in MOMENTA
+            ]
+            for drop in [*drops, round_drop(SMALL, 0.8, p_m, tip="sphere")]:
+                for name, value in chosen.items():
+                    values = {next(iter(LEVELS[name][0])): value}
+                    if name == "surface_crust":
+                        values["length"] = 0.3e-3
+                    drop = effects[name].apply(drop, values, place)
+                yield Task("together", case, drop)
+
+
 COLUMNS = ("group", "case", "geometry", "tip", "radius_mm", "speed_m_s", "p_m_Pa", "K0_Pa", "cells", "depth_mm",
            "stopping_time_ms", *(f"time_below_{stop:g}_ms" for stop in STOPS), "sine_time_ms", "viscous_share", "solver",
            *(f"volume_above_{phi:g}" for phi in FILLING))  # fmt: skip
+
+
+SETTING = COLUMNS[:9]
+
+
+def describe_setting(task: Task) -> dict[str, str]:
+    """The columns of a row that say what is run."""
+    setting, radius = task.setting, task.setting.projectile.tip_radius
+    row: dict[str, object] = {
+        "group": task.group, "case": task.case, "geometry": setting.geometry, "tip": setting.projectile.tip,
+        "radius_mm": radius * 1e3, "speed_m_s": setting.impact_speed, "p_m_Pa": setting.material.p_m,
+        "K0_Pa": setting.material.bulk_modulus, "cells": radius / setting.spacing,
+    }  # fmt: skip
+    return _as_text(row)
 
 
 def describe(task: Task, run: DropRun) -> dict[str, str]:
@@ -182,9 +260,6 @@ def describe(task: Task, run: DropRun) -> dict[str, str]:
     setting, radius = run.setting, run.setting.projectile.tip_radius
     unit = math.pi * radius**2 if setting.geometry == "planar" else 4.0 / 3.0 * math.pi * radius**3
     row: dict[str, object] = {
-        "group": task.group, "case": task.case, "geometry": setting.geometry, "tip": setting.projectile.tip,
-        "radius_mm": radius * 1e3, "speed_m_s": setting.impact_speed, "p_m_Pa": setting.material.p_m,
-        "K0_Pa": setting.material.bulk_modulus, "cells": radius / setting.spacing,
         "depth_mm": run.penetration_depth * 1e3, "stopping_time_ms": run.stopping_time * 1e3,
         "sine_time_ms": sine_time(run) * 1e3, "viscous_share": run.viscous_share,
         "solver": run.solver,
@@ -194,6 +269,10 @@ def describe(task: Task, run: DropRun) -> dict[str, str]:
         row[f"time_below_{stop:g}_ms"] = _crossing(run, int(below[0]), stop) * 1e3 if below.size else math.nan
     for phi in FILLING:
         row[f"volume_above_{phi:g}"] = run.compacted_volume(phi) / unit
+    return {**describe_setting(task), **_as_text(row)}
+
+
+def _as_text(row: dict[str, object]) -> dict[str, str]:
     return {key: f"{value:.5g}" if isinstance(value, float) else str(value) for key, value in row.items()}
 
 
@@ -223,7 +302,13 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=30.0, help="no run is begun after this time")
     parser.add_argument("--only", nargs="*", help="groups to run; default all")
     parser.add_argument("--tables", action="store_true", help="print the tables only")
+    parser.add_argument(
+        "--again", action="store_true", help="run a sample of the rows with the solver of today"
+    )
     options = parser.parse_args()
+    if options.again:
+        print(run_again(RunStore(options.store)))
+        return
     if not options.tables:
         run_plan(RunStore(options.store), options.minutes, options.only)
     import seed_tables  # beside this file; it reads this one
@@ -232,8 +317,9 @@ def main() -> None:
 
 
 def run_plan(store: RunStore, minutes: float, only: list[str] | None = None) -> None:
-    """Make what is missing, then write all that is there."""
+    """Make what is missing, then write all that is there; rows of runs that the store lacks stay."""
     began, rows, failed = time.monotonic(), [], 0
+    stored = {_key(row): row for row in _read_rows()}
     for task in plan():
         run = store.find(task.setting)
         wanted = not only or task.group in only
@@ -245,11 +331,45 @@ def run_plan(store: RunStore, minutes: float, only: list[str] | None = None) -> 
             print(f"did not stop: {task.group} {task.case} p_m {task.setting.material.p_m:g}", flush=True)
         elif run is not None:
             rows.append(describe(task, run))
+        elif (old := stored.get(_key(describe_setting(task)))) is not None:
+            rows.append(old)
     with TABLE.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, COLUMNS)
         writer.writeheader()
         writer.writerows(rows)
     print(f"{len(rows)} of {sum(1 for _ in plan())} runs in {TABLE.name}, {failed} without a stop")
+
+
+def _read_rows() -> list[dict[str, str]]:
+    if not TABLE.exists():
+        return []
+    with TABLE.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _key(row: dict[str, str]) -> tuple[str, ...]:
+    return tuple(row[name] for name in SETTING)
+
+
+def run_again(store: RunStore) -> str:
+    """The rows of AGAIN by the solver of today: ln D, ln T_s and the volume above φ = 0.20, less what the table holds."""
+    tasks = {_key(describe_setting(task)): task for task in plan()}
+    lines = ["group | case | radius, mm | speed, m/s | p_m, Pa | solver of the row | ln D | ln T_s | volume"]
+    for row in _read_rows():
+        known = (float(row["radius_mm"]), float(row["speed_m_s"]), float(row["p_m_Pa"]))
+        if (row["group"], row["case"], *known) not in AGAIN:
+            continue
+        run = store.get_many([tasks[_key(row)].setting], workers=1)[0]
+        if isinstance(run, FailedRun):
+            raise RuntimeError(f"{row['group']} {row['case']}: {run}")
+        new = describe(tasks[_key(row)], run)
+        changes = [math.log(float(new[name]) / float(row[name])) for name in ("depth_mm", "stopping_time_ms")]
+        volume = float(new["volume_above_0.2"]) - float(row["volume_above_0.2"])
+        lines.append(
+            f"{row['group']} | {row['case']} | {known[0]:g} | {known[1]:g} | {known[2]:g} | {row['solver'][:6]} | "
+            f"{changes[0]:+.4f} | {changes[1]:+.4f} | {volume:+.3f}"
+        )
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

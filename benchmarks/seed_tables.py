@@ -15,7 +15,9 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator, RectBivariateSpline
-from seed_study import GLASS, LARGE, LEVELS, MOMENTA, P_M_EFFECT, SMALL, speed_at
+from seed_study import GLASS, LARGE, LEVELS, MOMENTA, P_M_EFFECT, SMALL, TOGETHER, name_together, speed_at
+
+from labsim.diagnosis.next_experiment import expected_information
 
 Row = dict[str, str]
 DROPS = tuple((radius, speed_at(momentum, radius)) for radius in (SMALL, LARGE) for momentum in MOMENTA)
@@ -465,7 +467,7 @@ def list_information(study: Study) -> list[tuple[str, float, str]]:
 
     For hypotheses without a length or time of their own in the dust, a drop at the speed of the other size is that drop,
     scaled. Weights are exp(-χ²/2) with χ² over the best's reduced one, since not even the best fits; bits are the lower
-    bound of Kolchinsky & Tracey (2017), as in labsim's next_experiment.
+    bound that labsim's next_experiment uses.
     """
     brings = {
         "gravity",
@@ -503,15 +505,12 @@ def list_information(study: Study) -> list[tuple[str, float, str]]:
             errors = np.array(
                 [math.hypot(1e-4, 0.02 * (weight @ np.array(means))[0]), 0.05 * (weight @ np.array(means))[1]]
             )
-            sigma = errors[part]
-            distance = np.sum(((mean[:, None, :] - mean[None, :, :]) / sigma) ** 2, axis=-1)
-            bits = -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+            bits = expected_information(mean, np.diag(errors[part] ** 2), weight)
             found.append((f"{what} of {name}", bits, "; ".join(said)))
     shifts = np.array(
         [each.value if each.name in ("trigger_offset", "contact_offset") else 0.0 for each in standing]
     )
-    distance = ((shifts[:, None] - shifts[None, :]) / 1e-4) ** 2
-    bits = -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+    bits = expected_information(shifts[:, None], np.array([[1e-8]]), weight)
     found.append(("instant of contact to 0.1 ms, any drop", bits, "offset of the best fit against none"))
     return sorted(found, key=lambda each: -each[1])
 
@@ -591,6 +590,47 @@ def list_errors(rows: list[Row], study: Study) -> list[tuple[str, float, float, 
     return found
 
 
+def list_checked(study: Study) -> list[tuple[str, float, float, float, np.ndarray]]:
+    """Effects run together, or alone at their best: case, p_m (Pa), χ² interpolated, χ² of the runs, their nine numbers."""
+    weight = np.linalg.inv(covariance())
+    found = []
+    for chosen, _ in TOGETHER:
+        case = name_together(chosen)
+        own = [row for row in study.rows if row["group"] == "together" and row["case"] == case]
+        for p_m in sorted({float(row["p_m_Pa"]) for row in own}):
+            rods: dict[tuple[float, float], Row] = {}
+            volume = math.nan
+            for row in own:
+                if float(row["p_m_Pa"]) != p_m:
+                    continue
+                if row["tip"] == "sphere":
+                    volume = _volume(row)
+                else:
+                    rods[1e-3 * float(row["radius_mm"]), float(row["speed_m_s"])] = row
+            runs = [rods[radius, round(speed, 3)] for radius, speed in DROPS]
+            time, depth = (
+                np.log([1e-3 * float(row[name]) for row in runs]) for name in ("stopping_time_ms", "depth_mm")
+            )
+            direct = Outputs(time[None], depth[None], np.array([volume])).figures()[0]
+            between = study.with_effects(chosen, np.array([p_m])).figures()[0]
+            misfits = [float((f - OBSERVED) @ weight @ (f - OBSERVED)) for f in (between, direct)]
+            found.append((case, p_m, misfits[0], misfits[1], direct))
+    return found
+
+
+def facts_met(figures: np.ndarray) -> str:
+    """The facts met within two assumed standard deviations: R(atio), C(onstancy), D(epth), L(inearity), V(olume)."""
+    sigma = np.sqrt(np.diag(covariance(0.0)))
+    off = np.abs(figures - OBSERVED)
+    ratio = abs(figures[2] - figures[0] - math.log(6.2 / 3.0)) <= 2 * math.hypot(sigma[0], sigma[2])
+    met = (
+        ("R", ratio), ("C", off[1] <= 2 * sigma[1] and off[3] <= 2 * sigma[3]),
+        ("D", off[4] <= 2 * sigma[4] and off[6] <= 2 * sigma[6]), ("L", off[5] <= 2 * sigma[5] and off[7] <= 2 * sigma[7]),
+        ("V", off[8] <= 2 * sigma[8]),
+    )  # fmt: skip
+    return "".join(letter for letter, yes in met if yes) or "-"
+
+
 def table(head: str, rows: Iterable[Iterable[object]]) -> str:
     lines = [f"| {head} |", "|" + "---|" * (head.count("|") + 1)]
     for row in rows:
@@ -604,9 +644,9 @@ def fits_table(fits: Iterable[Fit]) -> str:
         shown = people(best.figures)
         shown.insert(4, f"{math.exp(best.figures[2] - best.figures[0]):.2f}")
         return [best.name, f"{best.value:.3g}{' (limit)' if best.at_limit else ''}", f"{best.p_m:.0f}", *shown,
-                f"{best.chi2:.1f}"]  # fmt: skip
+                f"{best.chi2:.1f}", facts_met(best.figures)]  # fmt: skip
 
-    head = "hypothesis | amplitude | p_m, Pa | T1 | n(T1) | T3 | n(T3) | T3/T1 | C1 | n(D1) | C3 | n(D3) | V | χ²"
+    head = "hypothesis | amplitude | p_m, Pa | T1 | n(T1) | T3 | n(T3) | T3/T1 | C1 | n(D1) | C3 | n(D3) | V | χ² | met"
     return table(head, map(line, fits))
 
 
@@ -673,6 +713,11 @@ def report(file: Path) -> str:
         "Pairs, no gravity",
         fits_table(
             replace(each, name=f"{each.name} + {b}") for _, b, each in fit_pairs(study, study.effects)[:8]
+        ),
+        "Run as they stand: χ² interpolated and of the runs",
+        table(
+            "effects | p_m, Pa | interpolated | runs | T1 | n(T1) | T3 | n(T3) | C1 | n(D1) | C3 | n(D3) | V | met",
+            ((case, p_m, a, b, *people(f), facts_met(f)) for case, p_m, a, b, f in list_checked(study)),
         ),
         "A time offset and one effect, with gravity",
         fits_table(fit_with_offset(heavy)[:8]),

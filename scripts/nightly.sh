@@ -30,7 +30,7 @@ try_lowest_versions() {
 
 for part in $parts; do
   case $part in
-    slow) run python -m pytest -q -m slow ;;
+    slow) run python -m pytest -q -n 2 -m slow ;;
     mutants) run env LABSIM_MUTANTS=1000 python -m pytest -q -s tests/faults/test_mutants.py ;;
     kills)
       for command in simulate calibrate track ct; do

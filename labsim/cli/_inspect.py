@@ -175,7 +175,7 @@ def inspect_scan(scan: Scan, campaign: Campaign) -> Found:
     found = Found(
         scan.name,
         f"{2e3 * scan.projectile.tip_radius:.3g} mm bead, tip {reduced.map.tip_depth * 1e3:.3f} mm deep, undisturbed dust of "
-        f"filling factor {phi.value:.4f} ± {phi.sigma:.1g}",
+        f"filling factor {phi.value:.5f} ± {phi.sigma:.5f}",
         {"filling_factor_undisturbed": phi.value, "tip_depth_m": reduced.map.tip_depth},
         list(reduced.map.warnings),
     )

@@ -130,10 +130,23 @@ def estimate_errors(sums: SectorSums, undisturbed: np.ndarray) -> CellErrors:
     high = np.where(used, sector_mean, -np.inf).max(2)
     low = np.where(used, sector_mean, np.inf).min(2)
     asymmetry = np.where(n > 0, high - low, np.nan)
-    white = np.where(good, (sums.mean() - np.mean(sums.mean()[good])) / sigma, np.nan)
-    white = white - np.nanmean(white)
-    correlation_r, correlation_z = (_lag(white, axis) for axis in (1, 0))
+    white, share = _whiten(np.where(good, sums.mean(), np.nan), sigma)
+    correlation_r, correlation_z = _lag(white, 1), _lag(white, 0)
+    # the mean taken out of every row is made of these cells themselves
+    correlation_r = correlation_r * (1 - share) + share
     return CellErrors(sigma, asymmetry, noise, float(np.sqrt(a)), correlation_r, correlation_z)
+
+
+def _whiten(level: FloatArray, sigma: FloatArray) -> tuple[FloatArray, float]:
+    """Deviations from the mean of their row, in sigma, and one over the cells of a row: layers, crusts and gradients of the
+    sample lie in rows and are no noise. level : (nz, nr), nan where it does not count."""
+    counted = np.isfinite(level)
+    weight = np.where(counted, 1 / sigma**2, 0.0)
+    enough = counted.sum(1) >= 3
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.nansum(level * weight, axis=1) / weight.sum(1)
+    white = np.where(enough[:, None], (level - mean[:, None]) / sigma, np.nan)
+    return white, float(1 / max(counted[enough].sum(1).mean(), 1.0)) if enough.any() else 0.0
 
 
 def _lag(white: FloatArray, axis: int) -> float:

@@ -19,7 +19,7 @@ class Phantom:
     zone : filling factor added at the bead's lowest point; it falls off as a Gaussian of width zone_width bead radii.
     noise, ring, cup : in filling factor (one voxel; one ring's standard deviation, one radius in
     seven has one; rim minus middle). tilt : rad about
-    which the zone leans towards x. surface : slice number of the free surface.
+    which the zone leans towards x. surface : slice number of the free surface. gradient : filling factor per m of depth.
     """
 
     shape: tuple[int, int, int] = (110, 104, 104)  # slices, rows, columns
@@ -27,6 +27,7 @@ class Phantom:
     radius: float = 13.5
     voxel: float = 37e-6  # m
     filling_factor: float = 0.15
+    gradient: float = 0.0
     zone: float = 0.10
     zone_width: float = 1.2
     surface: float = 22.0
@@ -44,7 +45,8 @@ class Phantom:
         depth = (self.centre[2] + self.radius - self.surface) * self.voxel
         distance2 = r[None, :] ** 2 + (z[:, None] + depth) ** 2
         width = self.zone_width * self.radius * self.voxel
-        return np.where(z[:, None] < 0, self.filling_factor + self.zone * np.exp(-distance2 / width**2), 0.0)
+        sound = self.filling_factor - self.gradient * z[:, None]
+        return np.where(z[:, None] < 0, sound + self.zone * np.exp(-distance2 / width**2), 0.0)
 
     def volume_beyond(self, threshold: float) -> float:
         """m^3 of dust denser than a threshold, outside the bead, by fine integration."""
@@ -72,7 +74,8 @@ class Phantom:
         width = self.zone_width * self.radius
         below = np.clip(k - self.surface + 0.5, 0, 1)
         tip = self.centre[2] + self.radius
-        dust = below * (self.filling_factor + self.zone * np.exp(-(r2 + (k - tip) ** 2) / width**2))
+        sound = self.filling_factor + self.gradient * self.voxel * np.maximum(k - self.surface, 0)
+        dust = below * (sound + self.zone * np.exp(-(r2 + (k - tip) ** 2) / width**2))
         d = np.sqrt((x - self.centre[0]) ** 2 + (y - self.centre[1]) ** 2 + (k - self.centre[2]) ** 2)
         inside = np.clip(self.radius - d + 0.5, 0, 1)
         bead = 2540.0 / self.calibration.density_solid

@@ -44,10 +44,7 @@ def suggest(
         for speed in family.speeds[1:]:
             means = np.stack([_predict(bench, fit, number, speed) for fit in standing])
             spread = _spread(bench, standing, number, speed, means.mean(axis=0))
-            difference = means[:, None, :] - means[None, :, :]
-            inverse = np.linalg.inv(spread)
-            distance = np.einsum("jki,il,jkl->jk", difference, inverse, difference)
-            bits = -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+            bits = expected_information(means, spread, weight)
             p = family.projectile
             found.append(
                 Suggestion(
@@ -58,6 +55,17 @@ def suggest(
             )
     worth = [each for each in found if each.information_bits >= WORTHWHILE]
     return sorted(worth, key=lambda each: -each.information_bits)[:5]
+
+
+def expected_information(means: FloatArray, spread: FloatArray, weight: FloatArray) -> float:
+    """Bits that a measurement is expected to tell, from below.
+
+    means : (hypotheses, values) predictions; spread : (values, values) covariance of the measurement; weight :
+    (hypotheses,) probabilities. Source: Kolchinsky & Tracey (2017), as above.
+    """
+    difference = means[:, None, :] - means[None, :, :]
+    distance = np.einsum("jki,il,jkl->jk", difference, np.linalg.inv(spread), difference)
+    return -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
 
 
 def _predict(bench: Workbench, fit: Fit, number: int, speed: float, shift: float = 0.0) -> FloatArray:

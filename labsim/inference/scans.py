@@ -22,7 +22,7 @@ from ..records import FillingMap, FloatArray, Scan
 from ..sph import DropRun
 from .blocks import Block
 from .forward import ResponseTable
-from .undisturbed import GREY
+from .undisturbed import GREY, observe_undisturbed
 
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
 NUMERICAL_DEPTH = 0.03  # of the depth: slow, shallow drops differ by up to 4 % between two codes
@@ -36,7 +36,8 @@ CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes o
 
 @dataclass(frozen=True)
 class ObservedScan:
-    """Cells of a map that are compared: filling_factor, sigma : (n,); row, column : (n,) int; r, z : (n,) m."""
+    """Cells of a map that are compared. cells : (nz, nr) which; filling_factor, sigma : (n,); undisturbed : of the whole
+    scan; beside : (n,) filling factor of the undisturbed dust at the depth of each cell, which crusts and gradients change."""
 
     scan: Scan
     reduced: ReducedScan
@@ -44,6 +45,7 @@ class ObservedScan:
     filling_factor: FloatArray
     sigma: FloatArray
     undisturbed: float
+    beside: FloatArray
 
     @property
     def name(self) -> str:
@@ -60,13 +62,17 @@ def observe_scan(reduced: ReducedScan) -> ObservedScan:
     r, z = np.meshgrid(found.r, found.z)
     inside = (r < 3 * radius) & (z < -0.25 * radius)
     cells = reduced.usable & inside & (np.abs(z + found.tip_depth + 0.85 * radius) < 1.15 * radius)
+    level = float(reduced.undisturbed.value)
+    dust = observe_undisturbed(reduced)
+    beside = np.full(r.shape, level) if dust is None else np.interp(-z, dust.depth, dust.filling_factor)
     return ObservedScan(
         reduced.scan,
         reduced,
         cells,
         found.filling_factor[cells],
         np.maximum(found.sigma[cells], 1e-4),
-        float(reduced.undisturbed.value),
+        level,
+        beside[cells],
     )
 
 
@@ -142,7 +148,7 @@ def linearise_scan(
     covariance[:n, :n] = noise
     cell = float(np.mean(np.diff(found.r)))
     distance2 = (apart_r**2 + apart_z**2) * (cell / observed.radius) ** 2
-    contrast = np.abs(here[:n] - observed.undisturbed)
+    contrast = np.abs(here[:n] - observed.beside)
     for share, length in NUMERICAL:
         error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
         covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2 / length**2)
@@ -154,7 +160,7 @@ def linearise_scan(
         (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here) / 0.02 * spread,
         by_strength * math.hypot(scatter, STRENGTH),
         np.append(here[:n] * GREY, 0.0),
-        np.append((here[:n] - observed.undisturbed) * CONTRAST, 0.0),
+        np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
     pull = (log_speed - model.stated) / spread

@@ -10,6 +10,8 @@ from typing import Any
 import corner
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 
 from ..diagnosis.campaign import Diagnosis
 from ..inference.posterior import Posterior
@@ -102,29 +104,47 @@ def projectile_markers(views: Sequence[DropView]) -> list[str]:
 
 
 def draw_maps(views: Sequence[MapView], path: Path) -> Path:
-    """Per scan a row: filling factor measured, simulated, and their difference for each fit."""
-    columns = 1 + 2 * max(len(view.simulated) for view in views)
+    """A row per scan and fit: filling factor measured, simulated, and their difference, on both sides of the axis."""
+    rows: list[list[tuple[MapView, str, FloatArray, dict[str, Any]]]] = []
+    for view in views:
+        measured = (view, f"{view.name}: φ measured", view.measured, PHI)
+        rows += [
+            [
+                measured,
+                (view, f"φ simulated, {name}", view.simulated[name], PHI),
+                (view, f"measured − {name}", view.left(name), DIFFERENCE),
+            ]
+            for name in view.simulated
+        ] or [[measured]]
+    columns = max(map(len, rows))
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
-            len(views), columns, figsize=(max(3.1 * columns, 4.6), 3.4 * len(views)), layout="constrained",
-            squeeze=False, sharex=True, sharey="row",
+            len(rows), columns, figsize=(max(3.1 * columns, 4.6), 3.0 * len(rows)), layout="constrained", squeeze=False
         )  # fmt: skip
-        for k, view in enumerate(views):
-            shown: list[tuple[str, FloatArray, dict]] = [("φ measured", view.measured, PHI)]
-            for name in view.simulated:
-                shown.append((f"φ simulated, {name}", view.simulated[name], PHI))
-                shown.append((f"measured − {name}", view.left(name), DIFFERENCE))
-            for ax, (title, values, colours) in zip(axes[k], shown, strict=False):
-                found = view.map
-                picture = ax.pcolormesh(found.r * 1e3, found.z * 1e3, values, **colours)
-                ax.set_title(f"{view.name}: {title}", fontsize=9)
-                figure.colorbar(picture, ax=ax, shrink=0.8)
-                ax.set_aspect("equal")
-                ax.set_xlabel("r (mm)")
-            axes[k, 0].set_ylabel("z (mm)")
+        for ax in axes.flat:
+            ax.set_visible(False)
+        for line, shown in zip(axes, rows, strict=True):
+            for ax, (view, title, values, colours) in zip(line, shown, strict=False):
+                _draw_map(ax, view, values, colours)
+                ax.set_title(title, fontsize=9)
+            line[0].set_ylabel("z (mm)")
+        for ax in axes[-1]:
+            ax.set_xlabel("r (mm)")
         figure.savefig(path)
         plt.close(figure)
     return path
+
+
+def _draw_map(ax: Axes, view: MapView, values: FloatArray, colours: dict[str, Any]) -> None:
+    found = view.map
+    r = np.concatenate([-found.r[::-1], found.r]) * 1e3
+    both = np.concatenate([values[:, ::-1], values], axis=1)
+    picture = ax.pcolormesh(r, found.z * 1e3, both, **colours)
+    plt.colorbar(picture, ax=ax, shrink=0.8)
+    radius = found.bead_radius * 1e3
+    ax.add_patch(Circle((0, radius - found.tip_depth * 1e3), radius, fill=False, ec=INK, lw=0.8))
+    ax.axhline(0.0, color=INK, lw=0.6)
+    ax.set(visible=True, aspect="equal", ylim=(found.z.min() * 1e3, found.z.max() * 1e3))
 
 
 def draw_posterior(posterior: Posterior, path: Path) -> Path:
@@ -171,6 +191,7 @@ def draw_p_m(posteriors: Sequence[tuple[str, Posterior]], path: Path) -> Path:
             values = posterior.samples("p_m_Pa") / 1e3
             ax.hist(values, bins=60, density=True, histtype="stepfilled", alpha=0.35, color=color, label=name)
         ax.set_xlabel("p_m (kPa)")
+        ax.set_ylabel("density")
         ax.set_yticks([])
         ax.legend(fontsize=8)
     return path

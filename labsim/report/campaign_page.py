@@ -20,8 +20,10 @@ from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
+from .phrases import say_p_value, say_probability
 from .provenance import trace_origin
 
+SAID = {"none": "the nominal model", "unknown": "no listed cause"}
 PICTURES = {
     "drops": "Every drop: measured depth against time, each simulation, and below it what each leaves, with the band of what a "
     "true model may leave. The numbers stand in the table above.",
@@ -53,13 +55,13 @@ def write_campaign_page(
         ("p_m, nominal", f"{quantiles['nominal']['q50'] / 1e3:.2f} kPa", _between(quantiles["nominal"])),
         (
             "p-value of the nominal model",
-            show_number(found.p_value, "{:.2g}"),
+            say_p_value(found.p_value),
             "it does not explain the data" if found.p_value < 0.05 else "it explains the data",
         ),
         (
             "most probable",
-            f"{found.verdict.probabilities[0][1]:.2f}",
-            " + ".join(found.verdict.probabilities[0][0]),
+            " + ".join(SAID.get(name, name) for name in found.verdict.probabilities[0][0]),
+            f"probability {say_probability(found.verdict.probabilities[0][1])}",
         ),
     ]
     if len(labels) > 1:
@@ -116,7 +118,7 @@ def write_calibration_page(
     sentence = (
         f"p_m = {q['q50'] / 1e3:.2f} kPa, 90 % between {q['q05'] / 1e3:.2f} and {q['q95'] / 1e3:.2f} kPa, from "
         f"{len(views)} drops; the simulation {'explains' if explains else 'does not explain'} them "
-        f"(p = {found.p_value:.2g})" + ("." if explains else "; labsim diagnose asks why.")
+        f"(p = {say_p_value(found.p_value)})" + ("." if explains else "; labsim diagnose asks why.")
     )
     others = [name for name in found.posterior.names if name != "p_m_Pa"]
     tiles = [
@@ -124,7 +126,7 @@ def write_calibration_page(
         *((name, show_number(summary["parameters"][name]["q50"], "{:.3g}"), "") for name in others[:2]),
         (
             "p-value of the model",
-            show_number(found.p_value, "{:.2g}"),
+            say_p_value(found.p_value),
             "it explains the data" if explains else "it does not explain the data",
         ),
     ]

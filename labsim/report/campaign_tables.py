@@ -16,6 +16,7 @@ from ..inference.posterior import Posterior
 from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..sph import solver_hash
+from .phrases import say_probability
 
 NUMERICAL_DEPTH = (
     0.0043  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
@@ -162,11 +163,11 @@ def say_verdict(found: Diagnosis) -> str:
         nominal = math.exp(found.nominal.log_p_m) / 1e3
         return (
             f"The nominal simulation explains these data at p_m = {nominal:.2f} kPa "
-            f"(probability {probability:.2f}); nothing in the catalogue is needed."
+            f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
         )
     if found.verdict.word == "unknown":
         return (
-            f"The simulation is wrong in a way that no listed cause explains (probability {probability:.2f}): "
+            f"The simulation is wrong in a way that no listed cause explains (probability {say_probability(probability)}): "
             f"what is missing looks like {say_missing(found)}."
         )
     parts = []
@@ -178,7 +179,7 @@ def say_verdict(found: Diagnosis) -> str:
         title = effect.title[0].lower() + effect.title[1:]
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     return (
-        f"The simulation is wrong because {' and '.join(parts)}, with probability {probability:.2f}; with it p_m is "
+        f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}; with it p_m is "
         f"{p_m:.2f} kPa instead of {math.exp(found.nominal.log_p_m) / 1e3:.2f} kPa, and {say_gain(found.gain)}."
     )
 
@@ -195,8 +196,11 @@ def say_gain(gain: Gain) -> str:
 def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
     lines = [say_verdict(found), ""]
     lines.append("  probability  cause")
-    for hypothesis, probability in found.verdict.probabilities[:6]:
+    worth = [each for each in found.verdict.probabilities if each[1] >= 5e-4][:6]
+    for hypothesis, probability in worth:
         lines.append(f"  {probability:11.3f}  {' + '.join(hypothesis)}")
+    if others := found.verdict.probabilities[len(worth) :]:
+        lines.append(f"  {sum(p for _, p in others):11.3f}  the {len(others)} others together")
     gain = found.gain
     lines.append(
         f"  held-out drops: rms {gain.rms_nominal * 1e6:.1f} µm nominal, {gain.rms_extended * 1e6:.1f} µm with "

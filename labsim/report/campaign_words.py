@@ -13,8 +13,9 @@ from ..inference.workbench import Workbench
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
 from .drop_views import DropView
+from .interactive import SIGNS
 from .page import show_number
-from .phrases import add_article, list_names, say_count, say_range, shown_unit
+from .phrases import add_article, list_names, say_count, say_p_value, say_range, shown_unit
 
 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
@@ -71,18 +72,19 @@ def describe_calibration(
     """fit: the one whose p_value this is; posteriors: (name of the model, posterior)."""
     first = posteriors[0][1]
     words = (
+        "p_m says how hard the dust is to compress: its compressive strength is Σ = p_m ((φ − φ₁)/(φ₂ − φ))^(Δ ln 10). "
         f"{fit.points} data enter the likelihood (free fall averaged over eight frames; the stated heights count). The nominal "
-        f"model leaves χ² = {fit.chi_square:.0f}; where it is right, data as far off come with p = "
-        f"{show_number(p_value, '{:.2g}')}. "
+        f"model, that of campaign.toml, leaves χ² = {fit.chi_square:.0f}; where it is right, data as far off come with p = "
+        f"{say_p_value(p_value)}. "
     )
     if drops > 1:
         words += (
-            f"From sample to sample ln p_m scatters by {scatter[0]:.3f} ± {scatter[1]:.3f}; the likelihood allows "
-            f"{bench.terms.scatter:g}. "
+            f"From drop to drop p_m scatters by {100 * scatter[0]:.1f} ± {100 * scatter[1]:.1f} %; the likelihood allows "
+            f"{100 * bench.terms.scatter:g} %. "
         )
-    words += f"The chain is converged: R-hat {first.r_hat:.3f}, {first.ess:.0f} independent samples."
+    words += f"The sampling is converged: R-hat {first.r_hat:.3f}, {first.ess:.0f} independent samples."
     if not first.r_hat < 1.05:
-        words = words.replace("The chain is converged", "The chain is not converged")
+        words = words.replace("sampling is converged", "sampling is not converged")
     rows = []
     for model, posterior in posteriors:
         for name in posterior.names:
@@ -151,13 +153,14 @@ def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
         "Measured minus simulated depth at the stop, in percent, against impact speed; a symbol a projectile, bars two standard "
         "deviations of what a true model may leave. The numbers stand in the table below."
     )
-    return {"words": words, "rows": rows, "text": text}
+    kinds = list(dict.fromkeys(map(say_projectile, views)))
+    return {"words": words, "rows": rows, "text": text, "symbols": list(zip(SIGNS * 9, kinds, strict=False))}
 
 
 def describe_numerics(error: dict[str, float], bench: Workbench) -> str:
     return (
-        f"At {error['spacing_m'] * 1e6:.3g} µm between particles (the smallest tip; as many to every tip) the "
-        f"simulated depth is right to {100 * error['depth_relative']:.2g} % rms, measured against an independent solver. The "
-        f"likelihood carries {100 * bench.terms.numerical:.2g} % of the depth for it, alike for like drops, and a contact that "
-        f"may be off by {100 * bench.terms.contact_offset:.2g} % of the tip radius in all drops together."
+        f"The particles of the simulation lie {error['spacing_m'] * 1e6:.3g} µm apart under the smallest tip, in proportion "
+        f"under larger ones. So the simulated depth is right to {100 * error['depth_relative']:.2g} % rms, measured against an "
+        f"independent solver. The likelihood allows {100 * bench.terms.numerical:.2g} % of the depth for it, alike for like "
+        f"drops, and a contact that is off by {100 * bench.terms.contact_offset:.2g} % of the tip radius in all drops together."
     )

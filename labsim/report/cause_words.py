@@ -26,7 +26,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
     for cause in summary["causes"]:
         name = " + ".join(cause["causes"])
         if cause["probability"] < RARE and rows:
-            rest.append(f"{name} {cause['probability']:.4f}")
+            rest.append(name + (f" {cause['probability']:.4f}" if cause["probability"] >= 5e-5 else ""))
             continue
         parameters = []
         for full, q in cause["parameters"].items():
@@ -39,7 +39,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
                 "probability": f"{cause['probability']:.3f}",
                 "percent": f"{100 * cause['probability']:.1f}",
                 "title": _title(found, cause["causes"]),
-                "parameters": parameters,
+                "parameters": parameters or ["–"],
             }
         )
     words = (
@@ -69,8 +69,17 @@ def _title(found: Diagnosis, causes: Sequence[str]) -> str:
     return "; ".join(fixed.get(name) or (known[name].title if name in known else name) for name in causes)
 
 
-def list_confusable(found: Diagnosis) -> list[tuple[str, str, str]]:
-    return [(first, second, show_number(cosine, "{:+.2f}")) for first, second, cosine in found.confusable]
+def list_confusable(found: Diagnosis) -> list[tuple[str, str, str, str]]:
+    """Cause, cause, cosine, and what the two are."""
+    return [
+        (
+            first,
+            second,
+            show_number(cosine, "{:+.2f}"),
+            f"{_title(found, [first])} / {_title(found, [second])}",
+        )
+        for first, second, cosine in found.confusable
+    ]
 
 
 def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dict[str, Any]:
@@ -81,11 +90,12 @@ def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dic
     words = f"Each drop was predicted once from the others, with its own free fall: the nominal model misses by {nominal} µm rms"
     if len(labels) > 1:
         sigma = gain["log_score_difference_sigma"]
-        about = f" ± {show_number(sigma, '{:.1f}')}" if np.isfinite(sigma) else ""
+        about = f" ±\u00a0{show_number(sigma, '{:.1f}')}" if np.isfinite(sigma) else ""
         fraction = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f}")
         words += (
             f", {labels[1]} by {extended} µm, and a true model would by {noise} µm; {fraction} % of the removable discrepancy is "
-            f"gone. The ln score of the held-out drops changes by {show_number(gain['log_score_difference'], '{:+.1f}')}{about}."
+            f"gone. The logarithm of the probability that was given to the held-out drops changes by "
+            f"{show_number(gain['log_score_difference'], '{:+.1f}')}{about}; above zero the extended model predicts better."
         )
     else:
         words += (
@@ -99,5 +109,5 @@ def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dic
         (name, *(show_number(1e6 * float(value), "{:.1f}") for value in values))
         for name, *values in zip(found.held_out_nominal.names, *columns, strict=True)
     ]
-    text = "Rms of each held-out drop below the surface for each model; the dash is what a true model would leave."
+    text = "What each model misses of a held-out drop below the surface, rms; the dash is what a true model would leave."
     return {"words": words, "rows": rows, "text": text}

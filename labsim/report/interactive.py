@@ -19,6 +19,7 @@ from .map_views import MapView
 
 ROLES = ("nominal", "extended")
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "star", "cross", "x")
+SIGNS = ("●", "■", "◆", "▲", "▼", "★", "✚", "✖")  # the same, for the key above the figure
 MARGIN = {"l": 54, "r": 12, "t": 26, "b": 42}
 Spec = dict[str, Any]
 
@@ -85,23 +86,17 @@ def plot_misfit(views: Sequence[DropView]) -> Spec:
             data.append(
                 {
                     "type": "scatter", "mode": "markers", "meta": role, "x": [view.speed for view in chosen], "y": left,
-                    "error_y": {"array": bars, "thickness": 1, "width": 3}, "showlegend": False,
+                    "error_y": {"array": bars, "thickness": 1, "width": 3},
                     "marker": {"symbol": symbol, "size": 8},
                     "name": html.escape(f"{kind}, {name}"), "text": [html.escape(view.name) for view in chosen],
                     "hovertemplate": "%{text}: %{y:+.2f} % at %{x:.3f} m/s",
                 }
             )  # fmt: skip
-        data.append(  # the legend names the symbols; the colours stand above the figure
-            {
-                "type": "scatter", "mode": "markers", "meta": "measured", "x": [None], "y": [None],
-                "name": html.escape(kind), "marker": {"symbol": symbol, "size": 8},
-            }
-        )  # fmt: skip
     layout = {
         "height": 360,
         "margin": MARGIN,
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": -0.32, "yanchor": "top"},
+        "showlegend": False,
         "xaxis": {"title": {"text": "impact speed (m/s)"}, "rangemode": "tozero"},
         "yaxis": {"title": {"text": "measured − simulated depth (%)"}, "zeroline": True},
     }
@@ -121,8 +116,8 @@ def plot_p_m(posteriors: Sequence[tuple[str, Posterior]]) -> Spec:
         )  # fmt: skip
     layout = {
         "height": 260,
-        "margin": MARGIN,
-        "legend": {"orientation": "h", "y": 1.12},
+        "margin": MARGIN | {"t": 10},
+        "showlegend": False,
         "xaxis": {"title": {"text": "p_m (kPa)"}},
         "yaxis": {"title": {"text": "density (peak = 1)"}, "rangemode": "tozero"},
     }
@@ -162,7 +157,7 @@ def plot_held_out(
         "margin": MARGIN,
         "barmode": "group",
         "hovermode": "x unified",
-        "legend": {"orientation": "h", "y": 1.14},
+        "showlegend": False,
         "xaxis": {"type": "category"},
         "yaxis": {"title": {"text": "rms of the held-out drop (µm)"}, "rangemode": "tozero"},
     }
@@ -179,7 +174,10 @@ def plot_map(view: MapView, values: FloatArray, *, difference: bool = False) -> 
     heat = {
         "type": "heatmap", "x": r, "y": found.z * 1e3, "z": values, "zmin": limits["vmin"],
         "zmax": limits["vmax"], "colorscale": "RdBu" if difference else "Viridis",
-        "colorbar": {"thickness": 10, "tickformat": "+.2f" if difference else ".2f", "len": 0.9},
+        "colorbar": {
+            "thickness": 10, "len": 0.9, "tickformat": "+.2f" if difference else ".2f",
+            "ticksuffix": "" if difference else "\u2007",  # as wide as those of a difference: maps side by side are alike
+        },
         "hovertemplate": "r %{x:.3f} mm, z %{y:.3f} mm: %{z:.4f}<extra></extra>",
     }  # fmt: skip
     layout: Spec = {

@@ -21,9 +21,10 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
     compared = [view.name for view in maps if view.simulated]
     if compared:
         words.append(
-            f"The maps of {list_names(compared)} are part of the likelihood. Simulated dust is seen through the own cells "
-            "and the blur of the scan, in the frame of the tip: moved so that its deepest tip lies where the bead ends. Only "
-            "cells that are compared carry a simulated value."
+            f"The maps of {list_names(compared)} are part of the likelihood. Simulated dust is shown as the scanner would see "
+            "it, with the scan's cells and blur, and moved up or down until the simulated bead ends where the scanned one "
+            "does. Only cells that enter the comparison carry a simulated value. Red in a difference: the dust is denser than "
+            "simulated. Heights z count from the undisturbed surface."
         )
     only = [view.name for view in maps if view.name not in used]
     if only:
@@ -35,9 +36,7 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
     if missing:
         words.append(f"No map could be made of {list_names(missing)}; the warnings say why.")
     if bench.undisturbed:
-        words.append(
-            "The undisturbed dust below and beside the beads is compared with the stated filling factor."
-        )
+        words.append("The undisturbed dust far from the beads is compared with the stated filling factor.")
     rows: list[list[dict[str, str]]] = []
     for k, view in enumerate(maps):
         dense = float(np.nanmax(view.measured)) if np.isfinite(view.measured).any() else float("nan")
@@ -47,6 +46,7 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
                 "figure": f"map{k}",
                 "text": f"Undisturbed φ {view.undisturbed:.4f}, up to {show_number(dense)} beside the bead, whose tip lies "
                 f"{view.map.tip_depth * 1e3:.2f} mm deep.",
+                "below": "",
             }
         ]
         for q, name in enumerate(view.simulated):
@@ -54,14 +54,16 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
                 {
                     "title": f"{view.name}: φ simulated, {name}",
                     "figure": f"map{k}_simulated{q}",
-                    "text": "On the compared cells.",
+                    "text": "Where it is compared.",
+                    "below": "yes" if q else "",
                 }
             )
             panels.append(
                 {
                     "title": f"{view.name}: measured − {name}",
                     "figure": f"map{k}_left{q}",
-                    "text": f"Rms {view.rms(name):.4f}; red is denser than simulated.",
+                    "text": f"{view.rms(name):.4f} rms on the cells compared.",
+                    "below": "",
                 }
             )  # fmt: skip
         rows.append(panels)

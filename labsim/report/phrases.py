@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..effects import Parameter
 
 SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm"), "1": (1.0, "")}  # to what people see
+
+SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def shown_unit(parameter: Parameter) -> tuple[float, str]:
@@ -15,6 +18,25 @@ def shown_unit(parameter: Parameter) -> tuple[float, str]:
 
 def add_article(label: str) -> str:
     return "the nominal model" if label == "nominal" else label
+
+
+def say_probability(value: float) -> str:
+    """Two digits; what would round to one is above 0.99."""
+    return f"{value:.2f}" if value < 0.995 else "above 0.99"
+
+
+def say_p_value(value: float) -> str:
+    """0.31, 4·10⁻⁹, > 0.99; a dash where there is none."""
+    if not math.isfinite(value):
+        return "–"
+    if value > 0.99:
+        return "> 0.99"
+    if value >= 1e-3:
+        return f"{value:.2g}"
+    if value <= 0.0:
+        return "< 10⁻³⁰⁰"
+    mantissa, exponent = f"{value:.0e}".split("e")
+    return f"{mantissa}·10⁻{str(-int(exponent)).translate(SUPERSCRIPT)}"
 
 
 def say_count(number: int, noun: str) -> str:

@@ -20,6 +20,9 @@ LEAST_ARC = 120.0  # degrees of the outline that must be seen for a centre
 DISTURBED = "bead disturbed (hand, shadow?)"
 MOST_KEPT_BYTES = 200_000_000
 MOST_BODIES = 12  # per frame, the largest
+SAMPLE = 16  # discs that say whether the smear changes
+LEAST_SAMPLE = 4
+MOST_CHANGE = 1.0  # px of smear that a fixed template can bear
 FAR = 12  # frames beyond its neighbours in which a bead is still looked for
 
 
@@ -54,11 +57,28 @@ def _jumps(outlines: list[Outline | None], width: float) -> bool:
     return int(np.sum(np.abs(step - np.median(step)) > max(2 * width, 12.0))) >= 3
 
 
-def needs_disc(outlines: list[Outline | None], smear: FloatArray) -> bool:
-    """Whether a fixed template does not serve this bead: its smear changes, or something else is in view."""
-    width = float(np.median([o.width for o in outlines if o is not None]))
-    known = smear[np.isfinite(smear)]
-    return _jumps(outlines, width) or float(np.subtract(*np.percentile(known, [95, 5]))) > 1.0
+def _needs_disc(
+    frames: Frames, scene: Scene, usable: np.ndarray, known: dict[int, Body], outlines: list[Outline | None]
+) -> bool:
+    """Whether a fixed template does not serve this bead: something else is in view, or its smear changes.
+
+    The smear is told by some discs, evenly spread over the fall: fitting all of them takes longer than all the rest.
+    """
+    if _jumps(outlines, float(np.median([o.width for o in outlines if o is not None]))):
+        return True
+    chosen = sorted(known)[:: -(-len(known) // SAMPLE)]
+    fall = _Fall(scene, usable, known, len(outlines))
+    for i, picture in enumerate(frames):
+        if i in chosen:
+            fall.fit(i, picture, max(0.0, known[i].height - known[i].width))
+    if not fall.settle_radius(least=LEAST_SAMPLE):
+        return False
+    for i in chosen:
+        fall.judge(i)
+    smear = [
+        disc.smear for disc, good in zip(fall.discs, fall.fitted, strict=True) if disc is not None and good
+    ]
+    return len(smear) >= LEAST_SAMPLE and float(np.subtract(*np.percentile(smear, [95, 5]))) > MOST_CHANGE
 
 
 def link_fall(bodies: list[list[Body]]) -> list[Body | None]:
@@ -97,13 +117,15 @@ def link_fall(bodies: list[list[Body]]) -> list[Body | None]:
     return chain
 
 
-def follow_bead(frames: Frames, scene: Scene, usable: np.ndarray) -> BeadTrack | None:
-    """Fit the disc in every frame of the fall; None where nothing falls like a bead."""
+def follow_bead(
+    frames: Frames, scene: Scene, usable: np.ndarray, outlines: list[Outline | None]
+) -> BeadTrack | None:
+    """Fit the disc in every frame of the fall; None where nothing falls like a bead, or a fixed template serves as well."""
     outliner = Outliner(scene)
     bodies = [outliner.find_bodies(p, float(scene.brightness[i])) for i, p in enumerate(frames)]
     chain = link_fall(bodies)
     known = {i: body for i, body in enumerate(chain) if body is not None}
-    if len(known) < 8:
+    if len(known) < 8 or not _needs_disc(frames, scene, usable, known, outlines):
         return None
     fall = _Fall(scene, usable, known, len(bodies))
     for i, picture in enumerate(frames):
@@ -162,11 +184,11 @@ class _Fall:
             self.slope,
         )
 
-    def settle_radius(self) -> bool:
-        """The median radius of all discs is the bead's; False with fewer than eight."""
+    def settle_radius(self, least: int = 8) -> bool:
+        """The median radius of all discs is the bead's; False with fewer than ``least``."""
         radii = [d.radius for d in self.discs if d is not None]
         self.radius = float(np.median(radii)) if radii else np.nan
-        return len(radii) >= 8
+        return len(radii) >= least
 
     def judge(self, i: int) -> None:
         """Accept the disc of frame i or say why not."""

@@ -79,7 +79,10 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     outliers = int(np.sum(~keep & window))
     if outliers:
         frames = ", ".join(str(f) for f in track.frame[trusted][~keep & window][:8])
-        warnings.append(f"{outliers} outliers left out (frames {frames}{' …' if outliers > 8 else ''})")
+        many = "s" if outliers > 1 else ""
+        warnings.append(
+            f"{outliers} outlier{many} left out (frame{many} {frames}{' …' if outliers > 8 else ''})"
+        )
     scale = motion.chi_square / max(motion.freedom, 1)
     if scale > 1.0 + 3.0 * np.sqrt(2.0 / max(motion.freedom, 1)):
         warnings.append(

@@ -7,6 +7,7 @@ light. The centre is the position at mid exposure, however long the smear.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.special import erf
@@ -113,6 +114,11 @@ def fit_disc(
     return Disc(*q[:2], sigma, *q[2:6], float(np.sqrt(variance)), arc)
 
 
+@cache
+def _gauss(count: int) -> tuple[FloatArray, FloatArray]:
+    return np.polynomial.legendre.leggauss(count)
+
+
 def draw_disc(
     yy: FloatArray, xx: FloatArray, shape: FloatArray, along: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -121,7 +127,7 @@ def draw_disc(
     shape : centre row and column, smear, radius, blur (px). The mean over the smear is a Gauss-Legendre sum.
     """
     y, x, smear, radius, blur = shape
-    nodes, weights = np.polynomial.legendre.leggauss(int(np.clip(np.ceil(smear / (1.5 * blur)) + 2, 2, 24)))
+    nodes, weights = _gauss(int(np.clip(np.ceil(smear / (1.5 * blur)) + 2, 2, 24)))
     m, slopes = np.zeros(len(yy)), np.zeros((len(yy), 5))
     for node, weight in zip(0.5 * nodes, 0.5 * weights, strict=True):
         dy, dx = yy - y - node * smear * along[0], xx - x - node * smear * along[1]

@@ -267,9 +267,9 @@ def fit_edge(
         m = 0.5 * (1 + erf(s / np.sqrt(2)))
         model = q[1] * ground * (1 - m) + q[2] * m
         density = np.exp(-0.5 * s**2) / np.sqrt(2 * np.pi) / blur
-        parts = (-(q[2] - q[1] * ground) * density, ground * (1 - m), m)
-        normal = np.array([[np.sum(weight * a * b) for b in parts] for a in parts])
-        right = np.array([np.sum(weight * a * (image - model)) for a in parts])
+        parts = np.stack([-(q[2] - q[1] * ground) * density, ground * (1 - m), m]).reshape(3, -1)
+        weighted = parts * weight.ravel()
+        normal, right = weighted @ parts.T, weighted @ (image - model).ravel()
         try:
             step = np.linalg.solve(normal, right)
         except np.linalg.LinAlgError:

@@ -137,6 +137,7 @@ def _register_all(
     chi = np.full(count, np.nan)
     lost = np.full(count, np.nan)
     shift_y = shift_x = 0.0
+    light = float(np.median(scene.background))
     last = None
     for i, picture in enumerate(frames):
         if progress is not None:
@@ -170,7 +171,7 @@ def _register_all(
             shift_x += 0.2 * (fit.x - x[i] - shift_x)
         if not np.isfinite(fit.sigma) or fit.sigma > 0.5:
             reason[i] = f"{which} end hardly visible"
-        elif scene.contrast * 0.5 > abs(fit.brightness * np.median(scene.background) - fit.level) * 2:
+        elif scene.contrast * 0.5 > abs(fit.brightness * light - fit.level) * 2:
             reason[i] = f"contrast of the {which} end is gone"
     typical = float(np.nanmedian(chi))
     usual_loss = float(np.nanmedian(lost))

@@ -117,6 +117,8 @@ def open_frames(path: Path | str) -> Frames:
     path = Path(path)
     if not path.exists():
         raise MeasurementError(path, "video", "does not exist; name a video file or a folder of pictures")
+    if path.is_file() and path.stat().st_size == 0:
+        raise MeasurementError(path, "video", "is empty (0 bytes); copy or record it again")
     formats = list_formats()
     for module in formats.values():
         if module.recognises(path):  # type: ignore[attr-defined]

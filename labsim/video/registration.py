@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..records import FloatArray
-from .likelihood import accumulate
+from .likelihood import accumulate, solve_step
 from .noise import Noise
 from .template import MARGIN, Template, spline_weights
 
@@ -94,10 +94,8 @@ def register(
             HUBER if robust else 1e9,
             ceiling,
         )
-        scale = np.sqrt(np.diag(fisher)) + 1e-12
-        try:
-            step = np.linalg.solve(fisher / np.outer(scale, scale) + 1e-9 * np.eye(6), right / scale) / scale
-        except np.linalg.LinAlgError:
+        step = solve_step(fisher, right)
+        if not np.all(np.isfinite(step)):
             return None
         jump = max(abs(step[0]), abs(step[1]))
         if jump > 2.0:
@@ -113,7 +111,7 @@ def register(
             return None
     if not np.isfinite(dy) or abs(oy + dy - y) > 12 or abs(ox + dx - x) > 12:
         return None
-    inverse = np.linalg.pinv(fisher / np.outer(scale, scale)) / np.outer(scale, scale)
+    inverse = _invert(fisher)
     return Fit(
         float(oy + dy),
         float(ox + dx),
@@ -125,6 +123,19 @@ def register(
         (float(theta[4]), float(theta[5])),
         inverse[0],
     )
+
+
+def _invert(fisher: FloatArray) -> FloatArray:
+    """Inverse of the Fisher matrix; what nothing is known of (a parameter without a pixel) gets no covariance."""
+    scale = np.sqrt(np.diag(fisher)) + 1e-12
+    both = np.outer(scale, scale)
+    try:
+        inverse = np.linalg.inv(fisher / both)
+    except np.linalg.LinAlgError:
+        return np.linalg.pinv(fisher / both) / both
+    if np.abs(inverse).max() > 1e12:
+        inverse = np.linalg.pinv(fisher / both)
+    return inverse / both
 
 
 def cut_region(picture, background, usable, top, left, h, w):  # type: ignore[no-untyped-def]

@@ -64,7 +64,7 @@ def follow_rod(
         raise MeasurementError(
             frames.path,
             "video",
-            "the tip is never seen free of the dust and the picture's edge; frame it wider",
+            "the tip is never seen free of the dust and the picture's edge; begin earlier or frame it wider",
         )
     first_sigma, tails = tip.sigma, 4.0  # what the pixels alone promise
     if frames.lossy:
@@ -145,8 +145,10 @@ def follow_rod(
         hidden = widen_for_hidden(frames.codec)
         sigma = sigma * hidden
         raised = hidden * float(np.nanmedian(tip.sigma / first_sigma))
+        cause = "what neighbouring pixels and frames share"
         warnings.append(
-            f"compressed with loss ({frames.codec.upper()}): error bars were raised {raised:.1f} "
-            "times, for what neighbouring pixels and frames share"
+            f"compressed with loss ({frames.codec.upper()}): error bars were raised {raised:.1f} times, for {cause}"
+            if raised >= 1.05
+            else f"compressed with loss ({frames.codec.upper()}): no error bar had to be raised for {cause}"
         )
     return Positions(row, sigma, x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)

@@ -63,7 +63,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     """Two passes over the video: what moves, then the background behind it. Raises MeasurementError."""
     path = frames.path
     low = high = first = previous = None
-    brightness, sparse, duplicate = [], [], []
+    brightness, sparse, duplicate, peak = [], [], [], 0
     step = max(1, int(np.sqrt(frames.shape[0] * frames.shape[1] / SPARSE)))
     for i, picture in enumerate(frames):
         small = picture[::step, ::step].astype(np.float32)
@@ -75,6 +75,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         level = float(np.median(small[lit] / np.maximum(first[lit], 1.0)))
         duplicate.append(previous is not None and np.array_equal(picture, previous))
         previous = picture
+        peak = max(peak, int(picture.max()))
         brightness.append(level if level > 0 else 1.0)
         if len(sparse) < NOISE_FRAMES:
             sparse.append(small / brightness[-1])
@@ -88,7 +89,8 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
             path, "video", f"only {len(brightness)} frames can be read; a drop needs at least 12"
         )
     brightness_array = np.array(brightness)
-    noise = measure_noise(np.array(sparse), float((1 << frames.bits) - 1))
+    ceiling = find_ceiling(frames.bits, peak)
+    noise = measure_noise(np.array(sparse), ceiling)
     span = high - low
     floor = float(np.median(span))
     threshold = max(_otsu(span), floor + 3.0)
@@ -120,7 +122,6 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     # the extremes over many frames lie a few standard deviations out
     projectile_level += (1 if dark else -1) * 0.6 * pixel_noise
     background, seen = average_background(frames, brightness_array, low, high, swept, dark)
-    ceiling = float((1 << frames.bits) - 1)
     scene_level = np.where(seen, background, np.nan)
     lit_level = float(np.nanmedian(scene_level[swept])) if np.any(seen & swept) else float(np.median(beside))
     halfway = 0.5 * (lit_level + projectile_level)
@@ -142,6 +143,18 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         surface_sigma=surface_sigma,
         ceiling=ceiling,
     )
+
+
+def find_ceiling(bits: int, peak: int) -> float:
+    """Grey level at which pixels saturate, from the largest level in the video.
+
+    Cameras of 10, 12 or 14 bit save words of 16, with the low bits used or the high ones.
+    """
+    for real in range(9, bits):
+        full = (1 << real) - 1
+        if peak in (full, full << (bits - real)):
+            return float(peak)
+    return float((1 << bits) - 1)
 
 
 def _otsu(values: FloatArray) -> float:

@@ -6,7 +6,7 @@ from exact distances to the outline, not from a coarse mask, so that the true po
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -57,7 +57,6 @@ class Recording:
     ceiling: float = 255.0
     dropped: tuple[int, ...] = ()
     duplicated: tuple[int, ...] = ()
-    warnings: list[str] = field(default_factory=list)
 
 
 def fall_and_stop(
@@ -225,8 +224,3 @@ def write_video(
         writer.write(picture if codec == "FFV1" else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
     writer.release()
     return path
-
-
-def degrade(recording: Recording, **changes: object) -> Recording:
-    """The same recording with some settings changed."""
-    return replace(recording, **changes)  # type: ignore[arg-type]

@@ -21,6 +21,14 @@ class Template:
         self.coefficients = spline_filter(opacity, order=3, mode="mirror")
         self.shape = (opacity.shape[0] - 2 * MARGIN, opacity.shape[1] - 2 * MARGIN)
 
+    def moved(self, dy: float, dx: float) -> FloatArray:
+        """m on the inner region for the template moved by (dy, dx), each |shift| < 1."""
+        wy, wx = spline_weights(float(dy))[0], spline_weights(float(dx))[0]
+        c, (h, w) = self.coefficients, self.shape
+        first = MARGIN - 2  # five taps from two before to two after the pixel
+        along = sum(wy[k] * c[first + k : first + k + h] for k in range(5))
+        return sum(wx[k] * along[:, first + k : first + k + w] for k in range(5))
+
     def shifted(self, dy: float, dx: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """m, ∂m/∂dy and ∂m/∂dx on the inner region for the template moved by (dy, dx), each |shift| < 1."""
         wy, gy = spline_weights(float(dy))
@@ -89,13 +97,13 @@ def sample_opacity(
     opacity = np.where(good, (ground - image) / np.where(np.abs(lever) > 1e-6, lever, 1.0), 0.0)
     if known is not None and np.isfinite(ceiling):
         reach = PAD + MARGIN
-        there = Template(np.pad(known.opacity, reach, mode="edge"), 0, 0).shifted(sy, sx)[0]
+        there = Template(np.pad(known.opacity, reach, mode="edge"), 0, 0).moved(sy, sx)
         opacity = np.where(image >= ceiling - 0.5, there, opacity)
-    wide = Template(opacity, 0, 0)
-    moved = wide.shifted(-sy, -sx)[0]  # content moved back so that the origin lies on a pixel
-    spoiled = Template((~good).astype(float), 0, 0).shifted(-sy, -sx)[0]
-    weight = np.where(
-        np.abs(spoiled) < 0.02, (lever**2 / noise.variance(image))[MARGIN:-MARGIN, MARGIN:-MARGIN], 0.0
-    )
+    # content moved back so that the origin lies on a pixel
+    moved = Template(opacity, 0, 0).moved(-sy, -sx)
+    weight = (lever**2 / noise.variance(image))[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    if not good.all():
+        spoiled = Template((~good).astype(float), 0, 0).moved(-sy, -sx)
+        weight = np.where(np.abs(spoiled) < 0.02, weight, 0.0)
     cut = PAD - MARGIN
     return moved[cut:-cut, cut:-cut], weight[cut:-cut, cut:-cut]

@@ -88,7 +88,7 @@ def _finish(
     warnings = []
     missing = int(frame[-1] - frame[0] + 1 - len(frame)) + int(np.sum(~valid))
     if missing:
-        warnings.append(f"{missing} frames have no position")
+        warnings.append("1 frame has no position" if missing == 1 else f"{missing} frames have no position")
     if row_sigma is None:
         row_sigma = measure_scatter(time[valid], row[valid])
         if not np.isfinite(row_sigma):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured, Track
-from .bead import follow_bead, is_bead, needs_disc
+from .bead import follow_bead, is_bead
 from .direction import check_direction, straighten
 from .following import Progress
 from .frames import Frames
@@ -85,15 +85,15 @@ def follow_projectile(
             "by some hundredths of a pixel together; use less light"
         )
 
-    found = None
-    if is_bead(outlines[0]):
-        found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
+    bead_like = is_bead(outlines[0])
+    found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings) if bead_like else None
     if found is None:
         try:
             check_direction(frames, outlines)
         except MeasurementError:
             # a hand that carries a ball up before it lets go is larger than the ball
-            found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
+            if not bead_like:
+                found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
             if found is None:
                 raise
     if found is None:
@@ -110,7 +110,9 @@ def follow_projectile(
     if valid.sum() < 8:
         common = max(set(r for r in reason if r), key=reason.count, default="unknown")
         raise MeasurementError(
-            frames.path, "video", f"only {int(valid.sum())} frames can be tracked ({common})"
+            frames.path,
+            "video",
+            f"only {int(valid.sum())} of {count} frames can be tracked, at least 8 are needed (most often: {common})",
         )
     where = surface_row if surface_row is not None else surface.value if surface is not None else None
     level = (
@@ -155,8 +157,8 @@ def _follow_bare_bead(
     frames: Frames, scene: Scene, usable: np.ndarray, outlines: list[Outline | None], warnings: list[str]
 ) -> Positions | None:
     """Positions of a bare bead, whose lowest point stands for the tip; None where it is better served by a template."""
-    bead = follow_bead(frames, scene, usable)
-    if bead is None or not needs_disc(outlines, bead.smear):
+    bead = follow_bead(frames, scene, usable, outlines)
+    if bead is None:
         return None
     sigma = raise_to_scatter(bead.y, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0)
     if frames.lossy:
@@ -228,7 +230,11 @@ def _outline_all(
             progress(i + 1, len(scene.brightness), "finding the projectile")
     seen = [o for o in found if o is not None]
     if len(seen) < 8:
-        raise MeasurementError(frames.path, "video", f"a projectile is seen in only {len(seen)} frames")
+        raise MeasurementError(
+            frames.path,
+            "video",
+            f"a projectile is seen in {len(seen)} of {len(found)} frames; at least 8 are needed, with light behind it",
+        )
     with_tip = [o.tip_width for o in seen if o.tip is not None]
     width = float(np.median([o.width for o in seen]))
     return found, width, float(np.median(with_tip)) if with_tip else width

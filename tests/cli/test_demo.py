@@ -12,16 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labsim.inference.runs import default_store
-
 ROOT = Path(__file__).parents[2]
 AGAIN = 15.0  # s of processor time for the second time: as long as the wait, but not lengthened by what else runs here
-
-
-@pytest.fixture(scope="module")
-def store() -> str:
-    """The user's own store: a run is the same whoever asks, so tests after a demo (or a demo after tests) take seconds."""
-    return str(default_store())
 
 
 def run_demo(store: str, folder: Path) -> tuple[str, float]:
@@ -39,9 +31,9 @@ def run_demo(store: str, folder: Path) -> tuple[str, float]:
 
 
 @pytest.fixture(scope="module")
-def first(store: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def first(shared_store: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("demo")
-    return folder, run_demo(store, folder)[0]
+    return folder, run_demo(shared_store, folder)[0]
 
 
 def load(folder: Path, name: str) -> dict:
@@ -143,9 +135,9 @@ def test_every_file_is_there(first: tuple[Path, str]) -> None:
 
 
 def test_a_second_time_takes_seconds_and_gives_the_same(
-    store: str, first: tuple[Path, str], tmp_path: Path
+    shared_store: str, first: tuple[Path, str], tmp_path: Path
 ) -> None:
-    _out, seconds = run_demo(store, tmp_path)
+    _out, seconds = run_demo(shared_store, tmp_path)
     before, after = load(first[0], "diagnosis.json"), load(tmp_path, "diagnosis.json")
     assert after["runs_new"] == 0 and after["runs_reused"] >= 40
     assert seconds < AGAIN

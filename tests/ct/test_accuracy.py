@@ -61,6 +61,15 @@ def test_undisturbed_level_and_tip(reduced_phantoms):
     assert reduced.voxel_noise == pytest.approx(phantom.noise, rel=0.05)
 
 
+def test_a_layered_sample_is_no_noise(reduced_phantoms):
+    _, flat = reduced_phantoms()
+    phantom, sloping = reduced_phantoms(gradient=10.0)
+    assert np.ptp(phantom.truth(np.array([5e-3]), np.array([-1e-4, -3e-3]))) > 0.02
+    for direction in ("correlation_r", "correlation_z"):
+        assert getattr(flat.errors, direction) == pytest.approx(0, abs=0.15)
+        assert getattr(sloping.errors, direction) == pytest.approx(getattr(flat.errors, direction), abs=0.1)
+
+
 def test_axis_off_by_one_voxel_changes_the_map_by_little(tmp_path):
     phantom = Phantom(noise=0.0)
     scan = phantom.write(tmp_path / "slices")

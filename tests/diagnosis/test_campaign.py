@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +18,18 @@ CAMPAIGNS = Path(__file__).parents[2] / "data" / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text())
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    """One store for all campaigns of this file: they share most of their runs."""
-    import os
-
-    named = os.environ.get("LABSIM_STORE")
-    return Path(named) if named else tmp_path_factory.mktemp("store")
+# Drops of one rod at six or seven speeds: a third of the runs of all four projectiles, and enough to name the cause; the share of
+# the discrepancy that the extension takes out is above the noise of these drops with all of them only.
+ONE_ROD = tuple(f"D{number:02d}" for number in range(1, 8))
 
 
+@pytest.mark.parametrize("drops", [ONE_ROD, pytest.param((), marks=pytest.mark.slow)], ids=["one rod", "all"])
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_the_hidden_cause_is_named(name, store):
-    found = diagnose_campaign(read_campaign(CAMPAIGNS / name), RunStore(store))
+def test_the_hidden_cause_is_named(name, drops, shared_store):
+    campaign = read_campaign(CAMPAIGNS / name)
+    if drops:
+        campaign = replace(campaign, drops=tuple(drop for drop in campaign.drops if drop.name in drops))
+    found = diagnose_campaign(campaign, RunStore(shared_store), workers=1)
     truth = TRUTH[name]
     best, probability = found.verdict.probabilities[0]
     assert best == (truth["cause"],)
@@ -40,11 +41,10 @@ def test_the_hidden_cause_is_named(name, store):
         assert found.p_value > 0.05
     else:
         assert found.p_value < 0.01
-        if (
-            found.gain.rms_nominal > found.gain.rms_noise
-        ):  # a wrong scale is on the held-out drop's own free fall too
-            assert found.gain.fraction_removed > 0.8
         assert found.gain.log_score_difference > 4
+        # a wrong scale is on the held-out drop's own free fall too
+        if not drops and found.gain.rms_nominal > found.gain.rms_noise:
+            assert found.gain.fraction_removed > 0.8
 
 
 def fake_fit(hypothesis, evidence):

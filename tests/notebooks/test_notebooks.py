@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import os
 import re
 from pathlib import Path
 
@@ -26,7 +25,7 @@ NOTEBOOKS = {
     "seed_experiment": (
         3,
         [
-            r"378 stored runs",
+            r"508 stored runs",
             r"ratio at equal speed 3\.00",
             r"stored stopping time (1\.00|0\.99)\d",
             r"nominal: T_s ratio 2\.4",
@@ -34,11 +33,6 @@ NOTEBOOKS = {
     ),
     "find_the_cause": (3, [r"verdict: effect", r"pixel_scale +(1|0\.9\d*)\n"]),
 }
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return os.environ.get("LABSIM_STORE") or str(tmp_path_factory.mktemp("store"))
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
@@ -52,8 +46,10 @@ def test_kept_small_and_without_outputs(path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", NOTEBOOKS)
-def test_runs_and_shows_what_it_promises(name: str, store: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LABSIM_STORE", store)
+def test_runs_and_shows_what_it_promises(
+    name: str, shared_store: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LABSIM_STORE", shared_store)
     notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     NotebookClient(
         notebook, timeout=LONGEST, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from labsim import __version__
+from labsim.report.interactive import SIGNS, SYMBOLS
+from labsim.report.phrases import say_p_value, say_probability
 from labsim.sph import solver_hash
 
 SECTIONS = "measurement calibration drops causes confusable gain next numerics warnings made".split()
@@ -183,6 +185,12 @@ def test_bands_hold_what_a_true_model_leaves(effect_found) -> None:  # type: ign
         assert 0.5 * view.noise < view.rms("true") < 2 * view.allowed.max() < 0.1 * view.at_stop()
 
 
+def test_the_extension_takes_the_discrepancy_out(effect_found) -> None:  # type: ignore[no-untyped-def]
+    """On drops held out, where it is well above what noise leaves."""
+    gain = effect_found.gain
+    assert gain.rms_nominal > 2 * gain.rms_noise and gain.fraction_removed > 0.8
+
+
 def test_a_single_drop_is_calibrated(calibrated: Path) -> None:
     page = Page(calibrated / "report.html")
     assert [a["id"] for a in page.all("section")] == [
@@ -217,3 +225,33 @@ def test_inputs_are_hashed(effect: Path, effect_found) -> None:  # type: ignore[
 def test_a_figure_s_data_are_finite(effect: Path) -> None:
     data = Page(effect / "report.html").scripts[0]
     assert "NaN" not in data and "Infinity" not in data and "<" not in data
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(0.31, "0.31"), (0.0021, "0.0021"), (3.6e-9, "4·10⁻⁹"), (9.6e-256, "1·10⁻²⁵⁵"), (1.0, "> 0.99"), (0.0, "< 10⁻³⁰⁰"),
+     (float("nan"), "–")],
+)  # fmt: skip
+def test_p_values_as_people_write_them(value: float, said: str) -> None:
+    assert say_p_value(value) == said
+
+
+def test_no_probability_is_said_to_be_one() -> None:
+    assert [say_probability(p) for p in (0.5, 0.994, 0.996, 1.0)] == [
+        "0.50",
+        "0.99",
+        "above 0.99",
+        "above 0.99",
+    ]
+
+
+def test_the_symbols_of_the_projectiles_are_named_above_the_figure(effect: Path) -> None:
+    """A sign a projectile, in the order of the figure's symbols; no legend inside that could cover data on a narrow page."""
+    page = Page(effect / "report.html")
+    figures = json.loads(page.scripts[0])
+    symbols = list(dict.fromkeys(trace["marker"]["symbol"] for trace in figures["misfit"]["data"]))
+    signs = [SIGNS[SYMBOLS.index(symbol)] for symbol in symbols]
+    places = [page.text.index(sign) for sign in signs]
+    assert len(signs) >= 2 and places == sorted(places)
+    for name in ("misfit", "p_m", "held_out"):
+        assert figures[name]["layout"]["showlegend"] is False

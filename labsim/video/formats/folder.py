@@ -26,7 +26,9 @@ def recognises(path: Path) -> bool:
 def open_file(path: Path) -> Frames:
     found = Counter(p.suffix.lower() for p in path.iterdir() if p.suffix.lower() in SUFFIXES)
     if not found:
-        raise MeasurementError(path, "video", "holds no TIFF, PNG or BMP picture")
+        raise MeasurementError(
+            path, "video", "holds no TIFF, PNG or BMP picture; export the frames as one of these"
+        )
     suffix = found.most_common(1)[0][0]
     files = [p for p in path.iterdir() if p.suffix.lower() == suffix]
     numbers = [_last_number(p) for p in files]

@@ -58,6 +58,12 @@ def make_grey(picture: np.ndarray, path: Path) -> np.ndarray:
     if picture.ndim == 3 and picture.shape[2] in (2, 3, 4):
         colours = picture[..., : 3 if picture.shape[2] >= 3 else 1]
         picture = np.round(colours.mean(axis=2)).astype(picture.dtype)
+    if picture.ndim == 3:
+        raise MeasurementError(
+            path,
+            "video",
+            f"holds {picture.shape[0]} pictures in one file; name the file itself, not its folder",
+        )
     if picture.ndim != 2:
         raise MeasurementError(path, "video", f"has pictures of shape {picture.shape}; export grey pictures")
     if picture.dtype == np.bool_:

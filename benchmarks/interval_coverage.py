@@ -1,6 +1,6 @@
 """Does the 90 % interval of p_m hold what it says? Campaigns of labsim's own solver at another spacing, calibrated and counted.
 
-    python benchmarks/coverage.py OUT [--campaigns 60] [--workers 2]
+    python benchmarks/interval_coverage.py OUT [--campaigns 60] [--workers 2]
 
 Every campaign has 15 drops of four projectiles and two maps, with every nuisance that labsim.inference.synthetic knows, and a p_m
 of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. Prints coverage and the goodness of fit.
