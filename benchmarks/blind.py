@@ -13,6 +13,7 @@ import json
 import math
 import subprocess
 import time
+from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
 
@@ -24,6 +25,11 @@ from labsim.diagnosis.campaign import CONFUSABLE, Diagnosis, diagnose_campaign
 from labsim.inference.runs import RunStore
 
 
+def name_hypothesis(causes: Iterable[str]) -> str:
+    """The same words for a pair in either order."""
+    return " + ".join(sorted(causes))
+
+
 def describe(name: str, found: Diagnosis) -> dict:
     """What the diagnosis says, before the truth is known."""
     p_m = found.posterior_extended.samples("p_m_Pa")
@@ -31,9 +37,9 @@ def describe(name: str, found: Diagnosis) -> dict:
     return {
         "campaign": name,
         "verdict": found.verdict.word,
-        "first": " + ".join(found.verdict.probabilities[0][0]),
+        "first": name_hypothesis(found.verdict.probabilities[0][0]),
         "probability": found.verdict.probabilities[0][1],
-        "ranked": [(" + ".join(h), p) for h, p in found.verdict.probabilities],
+        "ranked": [(name_hypothesis(h), p) for h, p in found.verdict.probabilities],
         "p_value": found.p_value,
         "p_m": float(np.median(p_m)),
         "p_m_90": tuple(np.quantile(p_m, [0.05, 0.95])),
@@ -50,7 +56,7 @@ def score(rows: list[dict], truth: dict) -> pd.DataFrame:
     table = []
     for row in rows:
         known = truth[row["campaign"]]
-        cause = known["cause"]
+        cause = name_hypothesis(known["cause"].split(" + "))
         alike = {cause}
         for first, second, cosine in row["confusable"]:
             if cause in (first, second) and abs(cosine) > CONFUSABLE:

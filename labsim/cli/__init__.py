@@ -132,7 +132,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(0)
         context = getattr(trouble, "ctx", None)
         path = context.command_path if context is not None else "labsim"
-        status = _complain(f"{path}: {trouble.format_message()}", 2)
+        status = _complain(
+            f"{path}: {trouble.format_message().rstrip('.')}; {path} --help says what it takes", 2
+        )
     except (KeyboardInterrupt, typer.Abort):
         status = STOPPED
     if status == STOPPED:

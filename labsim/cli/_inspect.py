@@ -85,7 +85,9 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
         found.line += f", {lost} without position"
     if lost > LOST_SHARE * track.frame.size:
         found.odd.append(f"{lost} of {track.frame.size} frames have no position")
-    found.odd += [text for text in curve.warnings if "outliers" not in text and "no position" not in text]
+    found.odd += [
+        text for text in curve.warnings if "left out (frame" not in text and "no position" not in text
+    ]
     free = int((track.time[track.valid] < curve.contact_time.value).sum())
     if free < LEAST_FRAMES:
         found.odd.append(

@@ -1,4 +1,4 @@
-"""``labsim track``: a video, a folder of pictures or a table of rows becomes a track and a deceleration curve."""
+"""``labsim track``: a video, pictures or rows become a deceleration curve."""
 
 from __future__ import annotations
 

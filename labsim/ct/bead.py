@@ -16,6 +16,8 @@ from .stack import SliceStack
 
 RAYS = 600
 COARSE = 160  # voxels along the longest side of the coarse mask that is labelled
+REACH = 3.5  # voxels about the bead's edge in which its width is fitted
+WIDE, WIDE_PASSES = 1.3, 4  # voxels of blur from which its outside has to be looked for further away
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,8 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
                 "the bead has no round edge; check radius_mm and voxel_um",
             )
         fit, radius, rms = _fit_sphere(points[used])
-    if abs(radius / stated - 1) > 0.15:
+    # where the half level is clipped the radius reads large by up to two blurs
+    if abs(radius - stated) > 0.15 * stated + (REACH if saturated else 0.0):
         raise MeasurementError(
             scan.slices,
             "projectile.radius_mm",
@@ -90,6 +93,8 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
         _fit_blur(box, fit, radius, level, top, directions, outside, tree, region)
         for region in ("lateral", "axial")
     )
+    if max(lateral, axial) > WIDE:  # nan where no axial edge is seen
+        lateral, axial = _fit_wide_blur(stack, fit + origin, stated, level, top, directions, (lateral, axial))
     x, y, k = (fit + origin).tolist()
     return Bead((x, y, k), radius, stated, rms, lateral, axial, saturated, tuple(warnings))
 
@@ -249,11 +254,14 @@ def _fit_clipped_edge(
 def _fit_blur(
     box: FloatArray, centre: FloatArray, radius: float, level: float, top: float,
     directions: FloatArray, outside: FloatArray, tree: cKDTree, region: str,
+    reach: float = REACH, slack: tuple[float, float] = (1.0, 0.4),
 ) -> float:  # fmt: skip
-    """Width of the edge: a step of ``level`` over each direction's own outside, spread by a Gaussian, clipped at top."""
+    """Width of the edge: a step of ``level`` over each direction's own outside, spread by a Gaussian, clipped at top.
+
+    reach : voxels about the edge that are fitted; slack : of the radius in voxels, and of the step, relative."""
     offset = np.stack(np.meshgrid(*(np.arange(n) for n in box.shape), indexing="ij"), -1) - centre
     distance = np.linalg.norm(offset, axis=-1)
-    near = np.abs(distance - radius) < 3.5
+    near = np.abs(distance - radius) < reach
     cosine = np.abs(offset[..., 2]) / np.maximum(distance, 1e-9)
     near &= (cosine < 0.5) if region == "lateral" else (cosine > 0.93)
     if region == "axial":
@@ -270,8 +278,33 @@ def _fit_blur(
     fit = least_squares(
         misfit,
         [0.7, radius, 1.0],
-        bounds=([0.05, radius - 1, 0.7], [4, radius + 1, 1.4]),
+        bounds=([0.05, radius - slack[0], 1 - 0.75 * slack[1]], [8, radius + slack[0], 1 + slack[1]]),
         loss="soft_l1",
         f_scale=15,
     )
     return float(fit.x[0])
+
+
+def _fit_wide_blur(
+    stack: SliceStack, centre: FloatArray, stated: float, level: float, top: float, directions: FloatArray,
+    blur: tuple[float, float],
+) -> tuple[float, float]:  # fmt: skip
+    """The same where the edge reaches to where its outside was looked for: further out, about the stated radius."""
+    for _ in range(WIDE_PASSES):
+        reach = 3.0 * np.nanmax(blur)
+        box, origin = _cut_box(stack, tuple(centre), int(np.ceil(stated + reach + 3)))
+        middle = centre - origin
+        along = stated + reach + np.arange(0.0, 2.0, 0.5)
+        points = middle + along[None, :, None] * directions[:, None, :]
+        grey = ndimage.map_coordinates(box, points.reshape(-1, 3).T, order=1, mode="nearest")
+        outside = grey.reshape(len(directions), -1).mean(1)
+        tree = cKDTree(directions)
+        lateral, axial = (
+            _fit_blur(box, middle, stated, level, top, directions, outside, tree, region, reach, (0.2, 0.05))
+            for region in ("lateral", "axial")
+        )
+        settled = abs(np.nanmax((lateral, axial)) - np.nanmax(blur)) < 0.05 * np.nanmax(blur)
+        blur = (lateral, axial)
+        if settled:
+            break
+    return blur

@@ -11,12 +11,13 @@ from ..errors import MeasurementError
 from ..records import FillingMap, FloatArray, Measured, Scan
 from .artefacts import Cupping, fit_cupping, remove_rings
 from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
-from .bead import Bead, find_bead
+from .bead import WIDE, Bead, find_bead
 from .stack import SliceStack, open_stack
 from .surface import Surface, find_surface
 
 CELL = 2  # voxels along an edge of a cell
 GUARD = 3.0  # voxels about the bead that belong to its point spread, not to the dust
+GUARD_BLURS = 3.5  # the same in standard deviations of a wide point spread
 TILT_SEEN = (4.0, np.deg2rad(0.4))  # a lean is followed where it is this many sigma and at least this large
 RINGS_SEEN = 0.3  # share of the slices that must show rings before any are taken out
 
@@ -93,9 +94,9 @@ def reduce_scan(
 ) -> ReducedScan:
     """Reduce one scan: bead and axis, free surface, artefacts, azimuthal mean with an error for each cell.
 
-    cell : voxels along an edge of a cell. guard : voxels about the bead that are left out. sample_filling_factor : of the
-    campaign's sample, for the cross-check of the grey calibration only. correct : remove cupping and rings where they
-    are significant. Raises MeasurementError, one line that names file and key.
+    cell : voxels along an edge of a cell. guard : voxels about the bead that are left out, at least. sample_filling_factor
+    : of the campaign's sample, for the cross-check of the grey calibration only. correct : remove cupping and rings where
+    they are significant. Raises MeasurementError, one line that names file and key.
     """
     report = progress or (lambda done, total, text: None)
     stack = open_stack(scan.slices)
@@ -110,6 +111,12 @@ def reduce_scan(
     report(0, 4, "bead")
     bead = find_bead(stack, scan)
     warnings += bead.warnings
+    blur = float(np.nanmax([bead.blur_lateral, bead.blur_axial, 0.0]))
+    if blur > WIDE and guard < GUARD_BLURS * blur:
+        guard = GUARD_BLURS * blur
+        warnings.append(
+            f"the bead's edge is blurred over {blur:.1f} voxels; {guard:.0f} voxels about the bead are left out"
+        )
     report(1, 4, "surface")
     x, y, k_bead = bead.centre
     surface = find_surface(stack, (x, y), k_bead, bead.stated_radius)

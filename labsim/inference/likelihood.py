@@ -43,6 +43,8 @@ class Terms:
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.004  # of the depth, smooth
+    numerical_change: float = 0.03  # of what an effect changes of the depth, smooth
+    numerical_strength: float = 0.02  # of ln p_m, common to all drops
     numerical_slope: float = 0.01  # of the depth, per e-fold of speed over √radius, common to all drops
     heights: bool = True
 
@@ -192,15 +194,18 @@ def linearise(
         # two codes part slowly from slow to fast drops: the one is too deep at one end, too shallow at the other
         swift = instant.log_speed - 0.5 * math.log(STANDARD_GRAVITY * model.radius) - USUAL_SWIFTNESS
         slope = np.maximum(here, 0.0) * swift * terms.numerical_slope
-        shared.setdefault("numerical slope", []).append((sections[name], np.concatenate([slope, pad])))
+        for kind, column in (("slope", slope), ("strength", by_strength * terms.numerical_strength)):
+            column = np.concatenate([column, pad])
+            shared.setdefault(f"numerical {kind}", []).append((sections[name], column))
         final = float(np.exp(code[0]))
         stop = float(np.exp(code[1]))
         clock = model.matrix @ (observed.time / instrument.rate_factor - instant.contact_time)
         fraction = np.clip(clock / stop, 0.0, 1.0)
         reached = np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0)
+        changed = here - depth(lp, {}, instrument, instant) if amplitudes else np.zeros_like(here)
         numerical.append(
             (
-                np.concatenate([reached * terms.numerical, pad]),
+                np.concatenate([np.hypot(reached * terms.numerical, changed * terms.numerical_change), pad]),
                 np.concatenate([fraction, pad]),
                 instant.log_speed - 0.5 * math.log(model.radius),
                 math.log(model.radius),

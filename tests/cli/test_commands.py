@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from labsim.cli import list_command_files, main
-from labsim.inference.runs import read_run_file
+from labsim.inference.run_file import read_run_file
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"
 TRACKS = SEED.parent / "campaigns" / "p01"
@@ -93,10 +93,10 @@ def test_a_drop_of_a_campaign_and_a_model_file(tmp_path: Path) -> None:
 
 
 MISTAKES = {
-    "no such command": (["nonsense"], ["No such command"]),
+    "no such command": (["nonsense"], ["No such command", "labsim --help"]),
     "no such option": (["check", "x", "--nonsense"], ["--nonsense"]),
     "missing folder": (["check", "/nonexistent"], ["/nonexistent", "no such folder"]),
-    "no argument": (["calibrate"], ["labsim calibrate", "Missing argument"]),
+    "no argument": (["calibrate"], ["labsim calibrate", "Missing argument", "labsim calibrate --help"]),
     "500 mm tip": (["simulate", "--tip-radius-mm", "500"], ["--tip-radius-mm", "500", "write 0.5"]),
     "negative mass": (["simulate", "--mass-mg", "-1"], ["--mass-mg", "-1", "negative"]),
     "NaN speed": (["simulate", "--speed-m-s", "nan"], ["--speed-m-s", "nan", "finite"]),

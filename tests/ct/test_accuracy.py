@@ -46,6 +46,12 @@ def test_bead_is_found_to_a_tenth_of_a_voxel(reduced_phantoms, seed):
     )  # voxels themselves blur by 0.29
 
 
+@pytest.mark.parametrize(("blur", "saturated"), [(3.0, False), (2.0, True)])
+def test_a_wide_point_spread_is_measured(reduced_phantoms, blur, saturated):
+    phantom, reduced = reduced_phantoms(blur=blur, saturated=saturated)
+    assert reduced.bead.blur_lateral == pytest.approx(phantom.blur, rel=0.1)
+
+
 def test_a_saturated_bead_is_found_too(reduced_phantoms):
     phantom, reduced = reduced_phantoms(saturated=True, noise=0.01)
     assert reduced.bead.saturated

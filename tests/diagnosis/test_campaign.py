@@ -10,7 +10,7 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
-from labsim.diagnosis.judge import TEMPERATURE, judge
+from labsim.diagnosis.judge import NESTED, PRIOR_PAIRS, TEMPERATURE, judge
 from labsim.inference.fitting import Fit
 from labsim.inference.runs import RunStore
 
@@ -65,7 +65,7 @@ def fake_fit(hypothesis, evidence):
 def test_probabilities_follow_bayes():
     catalogue = ["a", "b", "c", "d"]
     verdict = judge(fake_fit((), 0.0), [fake_fit(("a",), 3.0)], -1.0, catalogue, {"b": 0.5, "c": -2.0})
-    share = (1 - 0.5 - 0.1 - 0.05) / 4
+    share = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4
     weight = {
         ("none",): 0.5,
         ("unknown",): 0.1 * math.exp(-1),
@@ -77,3 +77,20 @@ def test_probabilities_follow_bayes():
     for hypothesis, probability in verdict.probabilities:
         assert probability == pytest.approx(weight[hypothesis] / total, rel=1e-12)
     assert verdict.word == "effect"
+
+
+def test_a_pair_must_earn_its_second_effect():
+    catalogue = ["a", "b", "c", "d"]
+    single = fake_fit(("a",), 50.0)
+
+    def ratio(gain: float) -> float:
+        verdict = judge(
+            fake_fit((), 0.0), [single, fake_fit(("a", "b"), 50.0 + gain)], -1.0, catalogue, {"c": 50.0}
+        )
+        found = dict(verdict.probabilities)
+        prior = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4 / (PRIOR_PAIRS / 6)
+        assert found["a", "b"] / found["c",] == pytest.approx(math.exp(gain / TEMPERATURE) / prior)
+        return found["a", "b"] / found["a",] * prior
+
+    assert ratio(6.0) == pytest.approx(math.exp(6.0 / NESTED))
+    assert ratio(8.0) == pytest.approx(math.exp(8.0 / NESTED))

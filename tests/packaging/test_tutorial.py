@@ -56,6 +56,8 @@ def test_from_an_empty_folder(
     said = run(capsys, "check", "my-drops")
     for number in ("0.663 mm deep", "g = 9.25 ± 0.01 m/s²"):
         assert number in said and number in PAGE
+    for line in said.splitlines():
+        assert line.strip() in PAGE, line
     said = run(capsys, "track", "my-drops/drops/D04")
     for line in said.splitlines()[:-1]:  # the last one names the folder
         assert line.strip() in PAGE, line

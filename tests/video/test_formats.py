@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -129,6 +131,24 @@ def test_a_folder_of_one_stack_names_the_stack(tmp_path) -> None:
     tifffile.imwrite(tmp_path / "stack.tif", np.zeros((5, 20, 20), np.uint16))
     with pytest.raises(MeasurementError, match=r"stack\.tif.*5 pictures in one file; name the file itself"):
         open_frames(tmp_path)
+
+
+@pytest.mark.slow
+def test_tracking_a_long_video_stays_in_500_megabytes() -> None:
+    """20 000 frames of 128 x 384, a gigabyte of pixels that are made when asked for, in a process of its own."""
+    program = """
+import resource, numpy as np
+from labsim.video import follow_projectile
+from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
+pictures, _ = render(Recording(), fall_and_stop(100, 60.3, 2.5, 30.0)[0])
+frames = make_frames(pictures)
+frames.start = lambda: (pictures[i if i < 94 else 94 + i % 6].copy() for i in range(20_000))
+frames.count, frames.numbers = 20_000, np.arange(20_000)
+assert follow_projectile(frames).track.valid.sum() > 19_900
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert int(found.stdout) * 1024 < 500e6
 
 
 @pytest.mark.parametrize("name", ["empty.avi", "text.avi", "text.cine", "text.tif", "text.mp4", "notes.doc"])
