@@ -23,7 +23,8 @@ import numpy as np
 
 from labsim.effects import list_effects, list_places, reference_campaign
 from labsim.inference.planar import planar_setting
-from labsim.inference.runs import FailedRun, RunStore
+from labsim.inference.run_file import FailedRun
+from labsim.inference.runs import RunStore
 from labsim.records import Material, Projectile
 from labsim.sph import DropRun, DropSetting
 

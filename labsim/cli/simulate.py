@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from ..inference.convergence import extrapolate, refine
-from ..inference.runs import RunStore, require_runs, write_run_file
+from ..inference.run_file import write_run_file
+from ..inference.runs import RunStore, require_runs
 from ..sph import DropRun, check_setting
 from . import options
 from ._setting import Asked, make_setting

@@ -32,6 +32,7 @@ MOST_EXPLORED = 3
 MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for the others
 NARROW = 15.0  # the same between effects whose order more runs may change
 MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
+LARGE = 0.5  # of an effect's step
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -206,7 +207,7 @@ def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
             and fit.evidence > top - NARROW
             and bench.costs_runs(name)
             and effect.kind != "numerics"
-            and abs(fit.values[name]) > abs(effect.amplitudes[0].step)
+            and abs(fit.values[name]) > LARGE * abs(effect.amplitudes[0].step)
         ):
             again.add(cause(name))
             with suppress(ExtrapolationError):

@@ -14,7 +14,8 @@ import numpy as np
 
 from ..records import Campaign, FloatArray, Projectile
 from ..sph import DropRun, DropSetting
-from .runs import FailedRun, Progress, RunStore
+from .run_file import FailedRun
+from .runs import Progress, RunStore
 
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa

@@ -12,7 +12,7 @@ from ..inference.calibrate import Calibration
 from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
-from .campaign_tables import say_verdict
+from .campaign_tables import say_missing, say_verdict
 from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
 from .cause_words import BADGES, describe_causes, describe_gain, list_confusable
 from .drop_views import DropView
@@ -64,7 +64,10 @@ def write_campaign_page(
             f"probability {say_probability(found.verdict.probabilities[0][1])}",
         ),
     ]
-    if len(labels) > 1:
+    if found.verdict.word == "unknown":
+        if "depth" in say_missing(found):
+            tiles.append(("what is missing", f"≈ {100 * found.unknown.size:.0f} %", "of the depth"))
+    elif len(labels) > 1:
         percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
         extended = quantiles["extended"]
         tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))

@@ -11,6 +11,7 @@ import hashlib
 import json
 import math
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from markupsafe import Markup
 from .. import __version__
 
 TEMPLATES = Path(__file__).parent / "templates"
+TOGETHER = re.compile(r" (?=(?:±|%|µm|mm|ms|kPa|Pa|m/s²?|mg)(?!\w))|(?<=±) ")
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ def write_html(path: Path, template: str, figures: Mapping[str, Any], **values: 
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_keep_units,
     )
     environment.filters["number"] = show_number
     scripts = _scripts(figures) if figures else []
@@ -78,6 +81,13 @@ def write_html(path: Path, template: str, figures: Mapping[str, Any], **values: 
     aside.write_text(text, encoding="utf-8", newline="\n")
     os.replace(aside, path)
     return path
+
+
+def _keep_units(value: Any) -> Any:
+    """A number is not parted from its unit or its error at the end of a line; what is markup already stays as it is."""
+    return (
+        TOGETHER.sub("\u00a0", value) if isinstance(value, str) and not isinstance(value, Markup) else value
+    )
 
 
 def show_number(value: Any, form: str = "{:.3g}") -> str:

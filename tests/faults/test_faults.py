@@ -21,7 +21,8 @@ import numpy as np
 import pytest
 
 from labsim.errors import InferenceError
-from labsim.inference.runs import HEAD, RunStore, make_key, read_run_file, require_runs, write_run_file
+from labsim.inference.run_file import HEAD, make_key, read_run_file, write_run_file
+from labsim.inference.runs import RunStore, require_runs
 from labsim.records import Material, Projectile
 from labsim.sph import DropRun, DropSetting
 

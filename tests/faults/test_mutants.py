@@ -5,8 +5,10 @@ LABSIM_MUTANTS=1000 pytest tests/faults/test_mutants.py        the nightly numbe
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
+import pkgutil
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -19,6 +21,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from small_campaign import copy_campaign
 
+import labsim
 from labsim.ct.phantom import Phantom
 from labsim.effects import list_effects
 from labsim.inference.runs import RunStore, require_runs
@@ -111,6 +114,14 @@ def change_file(file: Path, change: tuple | list) -> None:
         file.write_bytes(change_bytes(file.read_bytes(), change))
     else:
         file.write_text(change_text(file.read_text(errors="replace"), change), errors="replace")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def loaded() -> None:
+    """All of labsim, once here instead of in each forked command; that a command loads what it needs, tests/cli shows."""
+    for module in pkgutil.walk_packages(labsim.__path__, "labsim."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
 
 
 @pytest.fixture(scope="module")
@@ -370,6 +381,7 @@ def test_paths_that_lead_elsewhere(inputs: Path, root: Path, target: str) -> Non
 def test_names_are_only_names(inputs: Path, root: Path, name: str) -> None:
     folder = fresh(root, inputs / "campaign", "campaign")
     (folder / "campaign" / "drops" / "D05").rename(folder / "campaign" / "drops" / name)
+    shutil.rmtree(folder / "campaign" / "drops" / "D06")
     judge("campaign", attempt(["track", "campaign", "-o", "out", "--workers", "1", "-q"], folder), name)
     assert all((folder / "out") in path.parents for path in (folder / "out").rglob("*"))
 

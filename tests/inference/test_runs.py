@@ -13,17 +13,10 @@ import numpy as np
 import pytest
 
 from labsim.errors import InferenceError, SimulationError
-from labsim.inference import runs as runs_module
+from labsim.inference import run_file
 from labsim.inference.convergence import extrapolate, refine
-from labsim.inference.runs import (
-    FailedRun,
-    RunStore,
-    canonical,
-    make_key,
-    read_run_file,
-    require_runs,
-    write_run_file,
-)
+from labsim.inference.run_file import FailedRun, canonical, make_key, read_run_file, write_run_file
+from labsim.inference.runs import RunStore, require_runs
 from labsim.records import Material, Projectile
 from labsim.sph import DropRun, DropSetting, Numerics
 
@@ -84,7 +77,7 @@ def test_keys_depend_on_every_value_and_on_the_solver(monkeypatch: pytest.Monkey
     assert len(keys) == 5
     assert canonical(base.replace(gravity=0)) == canonical(base)  # 0 is 0.0
     before = make_key(base)
-    monkeypatch.setattr(runs_module, "solver_hash", lambda: "another solver")
+    monkeypatch.setattr(run_file, "solver_hash", lambda: "another solver")
     assert make_key(base) != before
 
 
@@ -135,7 +128,7 @@ def test_the_index_is_made_again_from_the_files(tmp_path: Path) -> None:
 def test_pruning_removes_runs_of_other_solvers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = RunStore(tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(runs_module, "solver_hash", lambda: "old")
+        patch.setattr(run_file, "solver_hash", lambda: "old")
         store.get_many([small_drop()], workers=1)
     store.get_many([small_drop()], workers=1)
     assert store.new == 2 and store.prune() == 1

@@ -255,3 +255,16 @@ def test_the_symbols_of_the_projectiles_are_named_above_the_figure(effect: Path)
     assert len(signs) >= 2 and places == sorted(places)
     for name in ("misfit", "p_m", "held_out"):
         assert figures[name]["layout"]["showlegend"] is False
+
+
+def test_an_unknown_cause_claims_no_gain_at_the_top(unknown: Path) -> None:
+    """The nearest listed cause is no answer: its p_m and gain stand further down, not beside the verdict."""
+    text = Page(unknown / "report.html").text
+    top = text[: text.index("What was measured")]
+    assert "what is missing" in top and "gone on held-out drops" not in top and "p_m with" not in top
+
+
+def test_numbers_stay_with_their_units(effect: Path) -> None:
+    source = Page(effect / "report.html").source
+    words = source[source.index("<main") : source.index("</main>")]
+    assert "\u00a0±\u00a0" in words and " ± " not in words and " µm rms" not in words
