@@ -35,6 +35,8 @@ if "NUMBA_CACHE_DIR" not in os.environ:
 # A loop over particles reads and writes two dozen rows, and each pair of them needs a test that they do not overlap before the
 # loop may be vectorised; by default the compiler gives up at eight tests. Rows never overlap, a test costs a nanosecond.
 llvmlite.binding.set_option("labsim", "-runtime-memory-check-threshold=2000")
+# A particle has some 24 neighbours, three vectors of eight. Loops that take two vectors at a time leave one for slow code behind.
+llvmlite.binding.set_option("labsim", "-force-vector-interleave=1")
 
 # not fastmath=True: "nnan" and "ninf" make NaN checks inside kernels return False in silence
 FAST = {"reassoc", "contract", "arcp", "nsz"}

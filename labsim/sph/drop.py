@@ -17,8 +17,8 @@ from ..errors import SimulationError
 from ..records import FloatArray, Projectile
 from . import particles as rows
 from ._jit import compiled_entry
-from .gradients import bound_step, carry_stress, deform, mirror_axis, renormalise
-from .lines import ROOM, WIDTH, make_lines, write_lines
+from .gradients import bound_step, carry_stress, deform, find_fronts, mirror_axis, renormalise
+from .lines import ROOM, WIDTH, make_lines, make_rows, write_lines
 from .materials.porous_dust import elastic_energy, tabulate_strengths, update_stress
 from .neighbours import Neighbours
 from .pairs import sum_forces, sum_gradients
@@ -40,6 +40,7 @@ LOG = (
     "outside",
 )
 STEPS_AT_ONCE = 64
+LEAST = 0.1  # of the skin: a list that allows less is made anew
 EIGHT = np.uint64(WIDTH)
 BLOCK = np.uint64(
     128
@@ -55,10 +56,10 @@ BLOCK = np.uint64(
 
 @compiled_entry
 def advance(
-    s, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin, start, neighbour, origin,
-    allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant, alpha, beta, affine, gap,
-    wall_weight, contact_stiffness, friction, side_friction, depth_knots, depth_force, speed_knots, speed_force,
-    law, extras, strength, tension,
+    s, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
+    start, neighbour, origin, allowed, steps, log, first, body, is_rod, tip_radius, body_mass, gravity, spacing, h, courant,
+    viscosity, front_rate, hold_apart, artificial_stress, gap, wall_weight, contact_stiffness, friction,
+    side_friction, depth_knots, depth_force, speed_knots, speed_force, stopped, law, extras, strength, tension,
 ):  # fmt: skip
     """Up to ``steps`` steps, or until a point has moved ``allowed`` from ``origin``. Returns how many were made.
 
@@ -71,7 +72,6 @@ def advance(
     plain = len(extras) == 0  # known to the compiler
     stop = start[1:]
     contact = np.zeros(2)
-    nearby, beyond = np.zeros((8, ROOM)), np.zeros((8, ROOM))
     for step in range(steps):
         worst = 0.0
         for i in range(n):
@@ -122,6 +122,20 @@ def advance(
             s[MXX], s[MXZ], s[MZX], s[MZZ], s[LXX], s[LXZ], s[LZX], s[LZZ], s[SXX], s[SZZ], s[SXZ], s[PRESSURE],
             density, s[WORK],
         )  # fmt: skip
+        if front_rate > 0.0:
+            find_fronts(
+                np.uint64(0),
+                np.uint64(n),
+                axisymmetric,
+                front_rate,
+                h,
+                u,
+                ring,
+                sound,
+                s[LXX],
+                s[LZZ],
+                s[SHEAR],
+            )
         if images > 0:
             for k in (AREA, WEIGHT, SOUND, LXX, LZZ, MXX, MZZ):
                 mirror_axis(n, images, source, s[k], 1.0)
@@ -141,8 +155,8 @@ def advance(
             write_lines(back, k, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ], s[MXX], s[MXZ], s[MZX])
         sum_forces(
             np.uint64(0), np.uint64(n), x, z, u, w, area, s[WEIGHT], sound, s[LXX], s[SHEAR], s[LZZ],
-            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, alpha, beta, affine,
-            s[FX], s[FZ], s[HEAT],
+            s[MXX], s[MXZ], s[MZX], s[MZZ], front, back, start, stop, neighbour, nearby, beyond, h, viscosity,
+            hold_apart, artificial_stress, s[FX], s[FZ], s[HEAT],
         )  # fmt: skip
         if axisymmetric:
             for i in range(n):
@@ -196,7 +210,12 @@ def advance(
         row[7] = body[3]
         row[8] = last[8] + dt * contact[0]
         row[9] = last[9] - dt * outside * body[1]
-        if far > 0 or abs(body[0] - body_origin) > allowed or body[1] >= 0.0 or not (abs(force) < 1.0e300):
+        if (
+            far > 0
+            or abs(body[0] - body_origin) > allowed
+            or (body[1] >= 0.0 and not stopped)
+            or not (abs(force) < 1.0e300)
+        ):
             return step + 1
     return steps
 
@@ -235,7 +254,8 @@ def evolve(
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
     neighbours = Neighbours(2 * h, skin)
-    state = np.zeros((dust.shape[0], n + WIDTH))
+    state = make_rows(dust.shape[0], n + WIDTH)
+    nearby, beyond = make_rows(WIDTH, ROOM), make_rows(WIDTH, ROOM)
     front, back = make_lines(n + WIDTH), make_lines(n + WIDTH)
     state[:, :n] = dust
     per_unit = 2 * math.pi if axisymmetric else 1.0
@@ -248,6 +268,11 @@ def evolve(
         material.shear_factor, setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
     )  # fmt: skip
     plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
+    wall_weight = solve_wall_weight(numerics.smoothing)  # a millisecond
+    hold_apart = (1,) if numerics.artificial_stress > 0.0 else ()
+    part = 1 - 0.5 / numerics.smoothing
+    artificial_stress = (numerics.artificial_stress, 1 / (part**4 * (5 - 4 * part)))
+    viscosity = (numerics.alpha, numerics.beta, numerics.affine)
     extras = () if plain else (1,)  # two types, so two compiled versions
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[0], -body[1]
@@ -261,29 +286,33 @@ def evolve(
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
         if n + source.size + WIDTH > state.shape[1]:
             front, back = (make_lines(n + source.size + 64 + WIDTH) for _ in range(2))
-            state = np.concatenate(
-                [state[:, :n], np.zeros((state.shape[0], source.size + 64 + WIDTH))], axis=1
-            )
+            larger = make_rows(state.shape[0], n + source.size + 64 + WIDTH)
+            larger[:, :n] = state[:, :n]
+            state = larger
         state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
         state[rows.Z, n : n + source.size] = state[rows.Z, source]
         neighbours.build(n, n + source.size, state[rows.X], state[rows.Z])
         builds += 1
-        origin = state[[rows.X, rows.Z], :n].copy()
-        near, inner, body_origin = _find_near(state[:, :n], projectile, setting.spacing, body[0], skin)
-        fresh = True
-        while fresh and body[2] < limit:
+        allowed, begun = 0.45 * skin, state[rows.X, :n].copy()
+        fresh = False
+        while allowed > LEAST * skin and body[2] < limit:
+            if not fresh:
+                origin = state[[rows.X, rows.Z], :n].copy()
+                near, inner, body_origin = _find_near(
+                    state[:, :n], projectile, setting.spacing, body[0], skin, axisymmetric
+                )
             if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
             left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, front, back, n, axisymmetric, source, twice_plane, fixed, free_mass, near, inner, body_origin,
-                neighbours.start, neighbours.list, origin, 0.45 * skin, steps, log, made + 1, body,
+                state, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near,
+                inner, body_origin, neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
                 projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
-                setting.gravity, setting.spacing, h, numerics.courant, numerics.alpha, numerics.beta, numerics.affine,
-                numerics.contact_gap, solve_wall_weight(numerics.smoothing), numerics.contact_stiffness,
+                setting.gravity, setting.spacing, h, numerics.courant, viscosity, numerics.front,
+                hold_apart, artificial_stress, numerics.contact_gap, wall_weight, numerics.contact_stiffness,
                 material.contact_friction, setting.side_friction * force_scale,
-                *depth_law, *speed_law, law, extras, strength, tension,
+                *depth_law, *speed_law, stop_step is not None, law, extras, strength, tension,
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():
                 raise _blown_up(setting, made + max(done, 0), body[2])
@@ -293,12 +322,12 @@ def evolve(
                 stop_step = made
                 limit = min(limit, body[2] * (1 + setting.after_stop))
                 at_stop = state[:, :n].copy()
-            if stop_step is not None:
-                fresh = fresh or (
-                    body[1] >= 0.0
-                    and np.abs(state[[rows.X, rows.Z], :n] - origin).max() < 0.45 * skin
-                    and abs(body[0] - body_origin) < 0.45 * skin
-                )
+            if not fresh:
+                state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
+                state[rows.Z, n : n + source.size] = state[rows.Z, source]
+                allowed = min(0.45 * skin, neighbours.spare(state[rows.X], state[rows.Z]))
+                if source.size:  # no point without an image may come so near to the mirror that it needs one
+                    allowed = min(allowed, 2 * skin - np.abs(state[rows.X, :n] - begun).max())
             if watch is not None:
                 _fill_elastic(setting, state[:, :n])
                 watch(float(body[2]), state[:, :n])
@@ -350,20 +379,18 @@ def _fill_elastic(setting: DropSetting, state: FloatArray) -> None:
 
 
 def _find_near(
-    state: FloatArray, projectile: Projectile, spacing: float, tip: float, skin: float
+    state: FloatArray, projectile: Projectile, spacing: float, tip: float, skin: float, axisymmetric: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Particles that can come within two spacings of the projectile, or to the axis, before the next list; and the tip now."""
-    x, z = np.abs(state[rows.X]), state[rows.Z]
+    x, z = state[rows.X], state[rows.Z]
     margin = 2 * spacing + skin
-    above = z - tip - projectile.tip_radius
-    beside = (above > 0) & (projectile.tip == "hemisphere")
-    distance = np.where(beside, x, np.hypot(x, above)) - projectile.tip_radius
     state[rows.DISTANCE] = 1.0e9
-    return (
-        np.nonzero(distance < margin)[0].astype(np.uint32),
-        np.nonzero(x < spacing)[0].astype(np.uint32),
-        float(tip),
-    )
+    near = np.nonzero(z > tip - margin)[0]
+    across, above = np.abs(x[near]), z[near] - tip - projectile.tip_radius
+    beside = (above > 0) & (projectile.tip == "hemisphere")
+    distance = np.where(beside, across, np.hypot(across, above)) - projectile.tip_radius
+    inner = np.nonzero(np.abs(x) < spacing)[0] if axisymmetric else np.zeros(0)
+    return near[distance < margin].astype(np.uint32), inner.astype(np.uint32), float(tip)
 
 
 def _find_images(x: FloatArray, near: float, mirrors: tuple[float, ...]) -> tuple[np.ndarray, FloatArray]:

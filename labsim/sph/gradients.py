@@ -60,6 +60,28 @@ def carry_stress(
 
 
 @compiled
+def find_fronts(low, high, axisymmetric, front, h, vr, ring, sound, lxx, lzz, shear):
+    """Take the linear velocity field (lxx, lzz, shear = lxz + lzx) away where the dust is pressed together along one line.
+
+    Viscosity acts on what particles' linear fields leave of a jump. In a compaction front the linear field is the jump, and
+    hardly anything would be left to damp it. A front: compression of h |div v| / c above ``front`` (all of it from three times
+    that on), and close to uniaxial: -div v over the norm of the strain rate from 0.7 (equal to shear) to 1.
+    """
+    hoops = 1.0 if axisymmetric else 0.0
+    for i in range(low, high):
+        hoop = hoops * vr[i] / ring[i]
+        a, b, c = lxx[i], lzz[i], shear[i]
+        pressed = max(-(a + b + hoop), 0.0)
+        size = math.sqrt(a * a + b * b + hoop * hoop + 0.5 * c * c)
+        along = min(max((pressed / max(size, 1.0e-300) - 0.7) / 0.3, 0.0), 1.0)
+        strong = min(max((h * pressed / sound[i] - front) / (2.0 * front), 0.0), 1.0)
+        keep = 1.0 - along * strong
+        lxx[i] = a * keep
+        lzz[i] = b * keep
+        shear[i] = c * keep
+
+
+@compiled
 def bound_step(low, high, axisymmetric, h, ring, sound, bxx, bzz, worst):
     """The larger of ``worst`` and of c² (1 + (a h/r)²) max(1, tr B / (2 FEW))², m²/s², over particles low..high-1.
 

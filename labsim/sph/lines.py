@@ -28,6 +28,13 @@ def make_lines(count: int) -> FloatArray:
     return raw[skip : skip + WIDTH * count]
 
 
+def make_rows(rows: int, count: int) -> FloatArray:
+    """Rows of at least ``count`` numbers, zeroed, each beginning on a cache-line boundary: a vector that straddles two lines
+    costs twice."""
+    lines = -(-count // WIDTH)
+    return make_lines(rows * lines).reshape(rows, lines * WIDTH)
+
+
 def _shuffle(builder, a, b, mask):
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), mask))
 
@@ -67,8 +74,7 @@ def _make_reader(wanted: int):
             rows = []
             for lane in range(WIDTH):
                 place = builder.add(args[2], ir.Constant(_INDEX, lane))
-                index = builder.load(builder.gep(near, [place]))
-                start = builder.shl(builder.zext(index, _INDEX), ir.Constant(_INDEX, 3))
+                start = builder.zext(builder.load(builder.gep(near, [place])), _INDEX)
                 rows.append(builder.load(_vector_at(builder, source, start), align=64))
             for field, column in enumerate(_transpose(builder, rows)[:wanted]):
                 place = builder.add(args[4], ir.Constant(_INDEX, field * ROOM))

@@ -63,7 +63,7 @@ def sum_gradients(
 @compiled
 def sum_forces(
     low, high, x, z, vx, vz, area, weight, sound, lxx, shear, lzz, mxx, mxz, mzx, mzz, front, back, start, stop, neighbour,
-    near, beyond, h, alpha, beta, affine, fx_out, fz_out, heat,
+    near, beyond, h, viscosity, hold_apart, artificial_stress, fx_out, fz_out, heat,
 ):  # fmt: skip
     """Force on particles low..high-1 (per radian, or per metre in the plane), and the heating by artificial viscosity.
 
@@ -71,11 +71,18 @@ def sum_forces(
     power of the stresses on the very gradients that sum_gradients gives. q_ij acts on that part of the velocity
     difference of a pair that the particles' own linear velocity field (share ``affine``) does not explain.
     weight = density times ring radius, shear = lxz + lzx. front: lines (x, z, u, w, A, Mzz, ...); back: lines
-    (weight, sound, lxx, shear, lzz, Mxx, Mxz, Mzx); near, beyond: (8, ROOM), what is worked on.
+    (weight, sound, lxx, shear, lzz, Mxx, Mxz, Mzx); near, beyond: (8, ROOM), what is worked on. viscosity: alpha, beta, affine.
+
+    hold_apart: empty, or one entry to switch on artificial stress: the tension of a pair along its own line, times
+    artificial_stress[0] times (W/W(spacing))⁴, holds the two apart (after Monaghan 2000, Gray et al. 2001, who take it from
+    each particle's principal stresses). It does no work in the book of heat. artificial_stress[1] is 1 over the kernel, as
+    (1 - q/2)⁴ (1 + 2q), at one spacing.
     """
     inverse_2h = 0.5 / h
     norm = GRADIENT_NORM / h**4
     floor = 0.01 * h * h
+    alpha, beta, affine = viscosity
+    share, per_kernel = artificial_stress
     half = 0.5 * affine
     linear = -0.25 * alpha * h
     square = -0.5 * beta * h * h
@@ -102,16 +109,24 @@ def sum_forces(
                 fz = f * dz
                 du = ui - near[2, k]
                 dw = wi - near[3, k]
-                jump = du * dx + dw * dz
-                jump -= half * (
+                approach = du * dx + dw * dz
+                jump = approach - half * (
                     ((ixx + beyond[2, k]) * dx + (ixz + beyond[3, k]) * dz) * dx
                     + (izz + beyond[4, k]) * dz * dz
                 )
                 mu = jump / (d2 + floor)
                 q = (wti + beyond[0, k]) * (linear * (ci + beyond[1, k]) + square * abs(mu)) * mu
+                power += q * f * approach
+                if len(hold_apart) > 0:
+                    skew = axz + azx + beyond[6, k] + beyond[7, k]
+                    pull = ((axx + beyond[5, k]) * dx + skew * dz) * dx + (azz + near[5, k]) * dz * dz
+                    pull = max(pull / (d2 + floor), 0.0)
+                    s2 = s * s
+                    g = s2 * s2 * (5.0 - 4.0 * s) * per_kernel
+                    g *= g
+                    q += share * pull * g * g
                 sx += (axx + beyond[5, k] - q) * fx + (axz + beyond[6, k]) * fz
                 sz += (azx + beyond[7, k]) * fx + (azz + near[5, k] - q) * fz
-                power += q * (fx * du + fz * dw)
             first += count
         fx_out[i] = norm * area[i] * sx
         fz_out[i] = norm * area[i] * sz

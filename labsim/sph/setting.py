@@ -18,6 +18,12 @@ class Numerics:
     alpha: float = 0.5  # artificial viscosity, on what two particles' own velocity gradients leave of a jump
     beta: float = 0.0  # its quadratic part
     affine: float = 1.0  # share of the linear velocity field taken out of the jump; 0 is Monaghan's viscosity
+    front: float = (
+        0.0  # compression h |div v| / c along one line from which on the jump stays whole; 0: nowhere
+    )
+    artificial_stress: float = (
+        0.0  # of the tension of a pair, holds it apart; for bodies without a tensile limit, dust has one
+    )
     courant: float = 0.9  # time step in smoothing lengths over the largest sound speed
     contact_gap: float = 0.5  # reach of the rigid surface in spacings, shrinking with the dust beside it
     contact_stiffness: float = 0.3  # in units of mass (sound speed / spacing)^2

@@ -102,6 +102,22 @@ def test_compaction_shock_with_the_viscosity_of_a_drop():
     assert measured == pytest.approx(front, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("geometry", "case"), [("planar", SHOCKS[1]), ("planar", SHOCKS[3]), ("axisymmetric", SHOCKS[1])]
+)
+def test_compaction_shock_with_fronts_looked_for(geometry, case):
+    """Linear part of the velocity field left in the jump where the dust is pressed along one line, taken out everywhere else."""
+    modulus, p_m, speed, phi, _, front = case
+    profile, measured, inside, _ = push_piston(
+        modulus, p_m, speed, front, 0.5 * (phi + 0.15), geometry, Numerics(front=0.005)
+    )
+    plateau = np.mean(profile[rows.DENSITY][inside]) / 2000.0
+    print(f"{geometry} p_m {p_m:g} v {speed}: φ {plateau / phi - 1:+.2%} front {measured / front - 1:+.2%}")
+    assert inside.sum() > 8
+    assert plateau == pytest.approx(phi, rel=0.02)
+    assert measured == pytest.approx(front, rel=0.02)
+
+
 @pytest.mark.parametrize("geometry", ["planar", "axisymmetric"])
 def test_slow_uniaxial_compression(geometry):
     """A press at less than 1 % of the sound speed: p follows Σ(φ), the axial stress Σ + 2Y/3."""

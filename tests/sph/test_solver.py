@@ -216,6 +216,13 @@ def test_strength_shape_of_one_changes_nothing(drop):
     assert digest(simulate(a_drop(strength_shape=((0.1, 1.0), (0.5, 1.0))))) == digest(drop)
 
 
+def test_looking_for_fronts_keeps_depth_and_books(drop):
+    run = simulate(a_drop(numerics=Numerics(front=0.005)))
+    assert run.penetration_depth == pytest.approx(drop.penetration_depth, rel=0.006)
+    assert abs(run.momentum_error) < 1e-12
+    assert abs(run.energy_error) < 0.01
+
+
 def test_a_filling_factor_that_grows_with_depth(drop):
     run = simulate(a_drop(filling_gradient=10.0))
     assert run.penetration_depth < drop.penetration_depth
