@@ -225,7 +225,7 @@ def sample_fit(
     return sample(
         target.log_probability,
         target.names,
-        target.misfit.centre,
+        np.clip(target.misfit.centre, *target.bounds.T),
         fit.covariance,
         seed=seed,
         transform=target.transform,

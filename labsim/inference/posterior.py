@@ -17,6 +17,7 @@ from typing import Any
 import emcee
 import numpy as np
 
+from ..errors import InferenceError
 from ..records import FloatArray
 from .chain import fingerprint, read_chain, write_chain
 from .runs import Progress
@@ -26,6 +27,7 @@ WALKERS_PER_PARAMETER = 16
 LONG_ENOUGH = 50  # autocorrelation times
 CHECK_EVERY = 500
 LONGEST = 40_000
+REDRAWS = 100  # of walkers that begin beyond a limit
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,25 @@ def measure_residual(
     return QuadraticResidual(centre, sigma, coefficients)
 
 
+def spread_walkers(
+    log_probability: Callable[[FloatArray], FloatArray],
+    centre: FloatArray,
+    covariance: FloatArray,
+    walkers: int,
+    random: np.random.Generator,
+) -> FloatArray:
+    """(walkers, d) starts, twice as wide as the posterior, all of them where it is not zero: a walker that begins beyond a
+    limit may never move, and then no chain is long enough. Raises InferenceError where no start is found."""
+    start = random.multivariate_normal(centre, 4.0 * covariance, size=walkers)
+    for attempt in range(REDRAWS):
+        outside = ~np.isfinite(log_probability(start))
+        if not outside.any():
+            return start
+        narrower = 4.0 * 0.95 ** (2 * attempt) * covariance
+        start[outside] = random.multivariate_normal(centre, narrower, size=int(outside.sum()))
+    raise InferenceError("", "posterior", f"is zero all around the best fit {centre}; look at labsim check")
+
+
 def sample(
     log_probability: Callable[[FloatArray], FloatArray],
     names: Sequence[str],
@@ -107,7 +128,7 @@ def sample(
     d = len(names)
     walkers = max(32, WALKERS_PER_PARAMETER * d)
     random = np.random.default_rng(seed)
-    start = random.multivariate_normal(centre, 4.0 * covariance, size=walkers)
+    start = spread_walkers(log_probability, centre, covariance, walkers, random)
     mark = fingerprint(tuple(names), seed, start, log_probability(start))
     kept = read_chain(backend, mark) if backend is not None else None
     memory = kept or emcee.backends.Backend()
