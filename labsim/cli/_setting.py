@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..campaign import MATERIAL_KEYS, read_campaign
+from ..campaign import read_campaign
+from ..campaign_tables import MATERIAL_KEYS
 from ..effects import (
     Effect,
     Model,

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..campaign import MATERIAL_KEYS, read_campaign
+from ..campaign import read_campaign
+from ..campaign_tables import MATERIAL_KEYS
 from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
 from ..effects import Model, write_model
 from ..inference.runs import RunStore

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..campaign import MATERIAL_KEYS
+from ..campaign_tables import MATERIAL_KEYS
 from ..errors import EffectError
 from ..records import Campaign
 from ..sph import DropSetting
