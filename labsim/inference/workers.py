@@ -65,7 +65,10 @@ def is_loss(trouble: BaseException) -> bool:
 def open_executor(
     workers: int | None, scheduler: str | None, wanted: int, *, compile_first: bool = True
 ) -> Iterator[tuple[Executor, int]]:
-    """An executor and how many runs it takes at once. Raises InferenceError where a scheduler does not answer."""
+    """An executor and how many runs it should hold. Raises InferenceError where a scheduler does not answer.
+
+    That is a few more than it works on at once: a worker goes on with the next run while the last one is written here.
+    """
     if scheduler is not None:
         with _open_dask(scheduler) as pair:
             yield pair
@@ -83,7 +86,7 @@ def open_executor(
         )
         _pools[count] = pool
     try:
-        yield pool, count
+        yield pool, count + 1
     except BaseException:
         _pools.pop(count, None)
         workers_now = list((pool._processes or {}).values())  # shutdown forgets them
@@ -161,4 +164,4 @@ def _open_dask(address: str) -> Iterator[tuple[Executor, int]]:
         slots = sum(client.nthreads().values())
         if slots == 0:
             raise InferenceError("", "--scheduler", f"{address} has no workers; start dask worker {address}")
-        yield OnDask(client), slots
+        yield OnDask(client), slots + max(2, slots // 4)
