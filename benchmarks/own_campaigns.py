@@ -22,11 +22,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from blind import name_hypothesis
 from scipy.stats import beta
 
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
-from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
+from labsim.diagnosis.campaign import CONFUSABLE, Judgement, judge_campaign
+from labsim.effects import Effect
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
@@ -36,7 +38,8 @@ from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
 LABELLED_SCANS = CAMPAIGN.parents[1] / "ct" / "labelled_scans"
 SCANS = [LABELLED_SCANS / name for name in ("p01-C01", "p05-C02")]  # frames, masks and errors of maps
-NOT_HIDDEN = ("resolution", "planar_geometry", "gravity")  # no truth of their own here
+# no truth of their own here; a floor has no tangent that a strength could be counted in
+NOT_HIDDEN = ("resolution", "planar_geometry", "gravity", "hard_floor")
 VOXEL = 40e-6  # m
 OFF_DEFAULT = 0.8  # hidden shapes are this share of the stated one
 
@@ -67,18 +70,21 @@ def judge_hidden(
     measurements = measure_hidden(truth, hidden, np.random.default_rng(seed), templates=templates)
     found = judge_campaign(*prepare(campaign, RunStore(store_at), workers=1, measurements=measurements))
     names = found.screening.names
-    alike = []
-    if hidden.cause in names:
-        k = names.index(hidden.cause)
-        alike = [
-            (other, round(float(found.screening.cosines[k, j]), 3)) for j, other in enumerate(names) if j != k
-        ]
+    alike = {
+        name: {
+            other: round(float(found.screening.cosines[names.index(name), j]), 3)
+            for j, other in enumerate(names)
+            if other != name
+        }
+        for name in hidden.effects
+        if name in names
+    }
     sigma = math.sqrt(found.best.covariance[0, 0])
-    value = next(iter(hidden.values.values()), math.nan)
+    value = next((value for values in hidden.effects.values() for value in values.values()), math.nan)
     first = found.verdict.probabilities[0]
     return {
         "cause": hidden.cause,
-        "values": dict(hidden.values),
+        "values": {name: dict(values) for name, values in hidden.effects.items()},
         "strength": strength,
         "seed": seed,
         "p_m": hidden.p_m,
@@ -89,9 +95,9 @@ def judge_hidden(
             name: found.bench.effects[name].amplitudes[0].null + amplitude
             for name, amplitude in found.best.values.items()
         },
-        "first": " + ".join(first[0]),
+        "first": name_hypothesis(first[0]),
         "probability": first[1],
-        "ranked": [(" + ".join(h), p) for h, p in found.verdict.probabilities],
+        "ranked": [(name_hypothesis(h), p) for h, p in found.verdict.probabilities],
         "alike": alike,
         "goodness": goodness_of_fit(found.nominal),
         "p_value": found.p_value,
@@ -99,30 +105,40 @@ def judge_hidden(
     }
 
 
+def judge_nominal(campaign: Campaign, store: RunStore, truth: TruthTable, workers: int) -> Judgement:
+    """A campaign with nothing hidden: its screening says how long every effect's fingerprint is."""
+    measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
+    return judge_campaign(*prepare(campaign, store, workers=workers, measurements=measurements))
+
+
+def set_strength(effect: Effect, signal: float, sigma: float, sign: int) -> dict[str, float] | None:
+    """Values of an effect that is this many standard deviations of its fingerprint; None beyond its limits."""
+    parameter = effect.amplitudes[0]
+    value = parameter.null + sign * sigma / signal
+    if not parameter.limits[0] <= value <= parameter.limits[1]:
+        return None
+    return {parameter.name: value, **{p.name: OFF_DEFAULT * p.null for p in effect.parameters if p.shape}}
+
+
 def choose_amplitudes(
     campaign: Campaign, store: RunStore, truth: TruthTable, sigmas: list[float], workers: int
 ) -> list:
     """(hidden, strength) of every effect at every strength that its limits allow, with alternating signs."""
-    measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
-    found = judge_campaign(*prepare(campaign, store, workers=workers, measurements=measurements))
+    found = judge_nominal(campaign, store, truth, workers)
     signal = {score.name: score.signal for score in found.screening.scores}
     chosen = []
     for number, (name, effect) in enumerate(sorted(found.bench.effects.items())):
         if name in NOT_HIDDEN or name not in signal:
             continue
-        parameter = effect.amplitudes[0]
         for k, sigma in enumerate(sigmas):
-            size = sigma / signal[name]
             for sign in ((-1) ** (number + k), -((-1) ** (number + k))):
-                value = parameter.null + sign * size
-                if parameter.limits[0] <= value <= parameter.limits[1]:
-                    shapes = {p.name: OFF_DEFAULT * p.null for p in effect.parameters if p.shape}
-                    chosen.append((Hidden(name, {parameter.name: value, **shapes}), sigma))
+                values = set_strength(effect, signal[name], sigma, sign)
+                if values is not None:
+                    chosen.append((Hidden({name: values}), sigma))
                     break
             else:
-                print(
-                    f"{name}: {sigma:.0f} sigma would be {size:.3g} {parameter.unit} from null, outside its limits"
-                )
+                size, unit = sigma / signal[name], effect.amplitudes[0].unit
+                print(f"{name}: {sigma:.0f} sigma would be {size:.3g} {unit} from null, outside its limits")
     return chosen
 
 
@@ -138,7 +154,10 @@ def report(rows: list[dict]) -> None:
     table = pd.DataFrame(rows)
     table["inside"] = (table.log_p_m - np.log(table.p_m)).abs() < 1.645 * table.log_p_m_sigma
     table["exact"] = table["first"] == table.cause
-    twins = [{other for other, cosine in alike if abs(cosine) > CONFUSABLE} for alike in table.alike]
+    twins = [
+        {other for near in alike.values() for other, cosine in near.items() if abs(cosine) > CONFUSABLE}
+        for alike in table.alike
+    ]
     table["alone"] = [not names for names in twins]
     alike = [name in names for name, names in zip(table["first"], twins, strict=True)]
     table["class"] = table.exact | np.array(alike)

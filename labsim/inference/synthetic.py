@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..ct.reduce import ReducedScan
-from ..effects import Effect, Instrument, list_effects, list_places
+from ..effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
 from ..errors import SimulationError
 from ..records import Campaign, Drop, FloatArray, Projectile, Track
 from ..sph import DropRun, DropSetting, simulate
@@ -37,21 +37,28 @@ OUTLIERS, MISSING = 0.01, 0.01  # shares of frames
 AFTER_STOP = 1.1  # frames kept, in stopping times
 ROW_NOISE = 1.5e-4  # of the filling factor of a row of undisturbed dust
 ROW_STEP, ROW_DEPTH = 8e-5, 3.3e-3  # m
+DRIFT = "sample_drift"  # the effect that is a p_m of each drop
 LIFT = 40e-6  # m, of a bead at rest over where its run ends: scale of an exponential law
+
+
+Effects = Mapping[str, Mapping[str, float]]  # values of the parameters, by name of the effect
 
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is put into a campaign. values : of the parameters of the effect called ``cause``; "none" has none."""
+    """What is put into a campaign. effects : all that are at work, by name, with the values of their parameters."""
 
-    cause: str = "none"
-    values: Mapping[str, float] = field(default_factory=dict)
+    effects: Effects = field(default_factory=dict)
     p_m: float = 1300.0
+
+    @property
+    def cause(self) -> str:
+        return " + ".join(sorted(self.effects)) or "none"
 
 
 @dataclass
 class TruthTable:
-    """Runs that truths are made of: nominal ones on all nodes, and one hidden effect's at the middle strength."""
+    """Runs that truths are made of: nominal ones on all nodes, and those with what is hidden at the middle strength."""
 
     campaign: Campaign
     store: RunStore
@@ -64,11 +71,12 @@ class TruthTable:
         jobs: list[tuple[Projectile, str, float]] = []
         settings: list[DropSetting] = []
         for projectile, speeds in self._families().items():
-            for name, effect_values, strength in self._variants(hidden):
+            for name, effects, strength in self._variants(hidden):
                 jobs.append((projectile, name, strength))
-                for speed in speeds:
-                    setting = self.setting(projectile, speed, strength)
-                    settings.append(self._apply(name.split(" ")[0], effect_values, setting))
+                place = next(iter(list_places(self.campaign).values()))
+                settings += [
+                    self.apply(effects, self.setting(projectile, speed, strength), place) for speed in speeds
+                ]
         runs = self.store.get_many(settings, workers=self.workers, progress=self.progress, text="truths")
         codes: dict[tuple[Projectile, str, float], FloatArray] = {}
         at = 0
@@ -93,10 +101,10 @@ class TruthTable:
         weights = interpolation_weights(np.log(STRENGTHS), log_p_m)
         across = interpolation_weights(table.log_speeds, log_speed)
         code = sum(w * (across @ table.base[k]) for k, w in enumerate(weights))
-        name = _variant(hidden)
+        name = _variant(self._costly(hidden))
         if name in table.changes:
             code = code + across @ table.changes[name][1][1.0]
-        elif name and self._costs_runs(hidden):
+        elif name:
             raise SimulationError("simulation", "truth", f"{name} has no runs; prepare it, or it failed")
         return np.asarray(code)
 
@@ -109,13 +117,18 @@ class TruthTable:
             speeds.setdefault(_bare(drop.projectile), []).extend([fall * slack, fall / slack])
         return {p: _own_nodes(min(v), max(v)) for p, v in speeds.items()}
 
-    def _variants(self, hidden: Sequence[Hidden]) -> list[tuple[str, Mapping[str, float], float]]:
-        plain: list[tuple[str, Mapping[str, float], float]] = [("", {}, strength) for strength in STRENGTHS]
-        named = {_variant(each): each.values for each in hidden if self._costs_runs(each)}
-        return plain + [(name, values, STRENGTHS[1]) for name, values in named.items()]
+    def _variants(self, hidden: Sequence[Hidden]) -> list[tuple[str, Effects, float]]:
+        plain: list[tuple[str, Effects, float]] = [("", {}, strength) for strength in STRENGTHS]
+        named = {_variant(effects): effects for effects in map(self._costly, hidden) if effects}
+        return plain + [(name, effects, STRENGTHS[1]) for name, effects in named.items()]
 
-    def _costs_runs(self, hidden: Hidden) -> bool:
-        return hidden.cause not in ("none", "sample_drift") and self.effect(hidden.cause).costs_runs
+    def _costly(self, hidden: Hidden) -> Effects:
+        """Those of the hidden effects that need runs of their own; a drift is a p_m of each drop, which the nodes hold."""
+        return {
+            name: values
+            for name, values in hidden.effects.items()
+            if name != DRIFT and self.effect(name).costs_runs
+        }
 
     def effect(self, name: str) -> Effect:
         return list_effects(self.campaign.folder)[name].for_campaign(self.campaign)
@@ -123,17 +136,23 @@ class TruthTable:
     def setting(self, projectile: Projectile, speed: float, p_m: float) -> DropSetting:
         return set_nominal_drop(self.campaign, projectile, speed, p_m, TRUTH_CELLS)
 
-    def _apply(self, name: str, values: Mapping[str, float], setting: DropSetting) -> DropSetting:
-        if not name:
-            return setting
-        place = next(iter(list_places(self.campaign).values()))
-        return self.effect(name).apply(setting, values, place)
+    def apply(self, effects: Effects, setting: DropSetting, place: Place) -> DropSetting:
+        """The drop with all these effects."""
+        return apply_effects(setting, effects.items(), place, {name: self.effect(name) for name in effects})
+
+    def instrument(self, hidden: Hidden, place: Place) -> Instrument:
+        """What the hidden effects do to the measurement."""
+        instrument = Instrument()
+        for name, values in hidden.effects.items():
+            instrument = self.effect(name).apply_to_instrument(instrument, values, place)
+        return instrument
 
 
-def _variant(hidden: Hidden) -> str:
-    if hidden.cause == "none":
-        return ""
-    return hidden.cause + " " + " ".join(f"{key}={value:.6g}" for key, value in sorted(hidden.values.items()))
+def _variant(effects: Effects) -> str:
+    return " + ".join(
+        " ".join([name, *(f"{key}={value:.6g}" for key, value in sorted(effects[name].items()))])
+        for name in sorted(effects)
+    )
 
 
 def _bare(projectile: Projectile) -> Projectile:
@@ -158,47 +177,38 @@ def measure_hidden(
     templates : reduced scans of the campaign whose frame, mask and errors the maps of this truth take; none, no maps.
     """
     campaign = truth.campaign
-    effect = None if hidden.cause == "none" else truth.effect(hidden.cause)
     places, fractions = list_places(campaign), sequence_fractions(campaign.drops)
     drops = []
     for drop in campaign.drops:
-        instrument, shift = Instrument(), SCATTER * rng.standard_normal()
-        if effect is not None:
-            instrument = effect.apply_to_instrument(instrument, hidden.values, places[drop.name])
-            if hidden.cause == "sample_drift":
-                plain = truth.setting(_bare(drop.projectile), 0.5, hidden.p_m)
-                changed = effect.apply(plain, hidden.values, places[drop.name])
-                shift += math.log(changed.material.p_m / hidden.p_m)
+        place, shift = places[drop.name], SCATTER * rng.standard_normal()
+        if DRIFT in hidden.effects:
+            plain = truth.setting(_bare(drop.projectile), 0.5, hidden.p_m)
+            changed = truth.apply({DRIFT: hidden.effects[DRIFT]}, plain, place)
+            shift += math.log(changed.material.p_m / hidden.p_m)
+        instrument = truth.instrument(hidden, place)
         track = _film(truth, hidden, drop, instrument, math.log(hidden.p_m) + shift, rng)
         drops.append(observe_drop(drop, track, fractions[drop.name]))
     dust = []
     for scan in campaign.scans[:scans]:
         depth = np.arange(2 * ROW_STEP, ROW_DEPTH, ROW_STEP)
-        setting, instrument = truth.setting(_bare(scan.projectile), 0.5, hidden.p_m), Instrument()
-        if effect is not None:
-            setting = effect.apply(setting, hidden.values, places[scan.name])
-            instrument = effect.apply_to_instrument(instrument, hidden.values, places[scan.name])
+        setting, place = truth.setting(_bare(scan.projectile), 0.5, hidden.p_m), places[scan.name]
+        setting, instrument = truth.apply(hidden.effects, setting, place), truth.instrument(hidden, place)
         level = instrument.stated_filling_factor(initial_filling_factor(setting, depth))
         seen = level + ROW_NOISE * rng.standard_normal(depth.size)
         spread = math.hypot(scan.voxel * math.exp(0.1 * rng.standard_normal()), instrument.ct_blur)
         dust.append(UndisturbedDust(scan, depth, seen, np.full(depth.size, ROW_NOISE), spread))
-    maps = [_scan(truth, hidden, effect, template, rng) for template in templates]
+    maps = [_scan(truth, hidden, template, rng) for template in templates]
     return Measurements(drops, maps, dust)
 
 
-def _scan(
-    truth: TruthTable, hidden: Hidden, effect: Effect | None, template: ReducedScan, rng: np.random.Generator
-) -> ReducedScan:
+def _scan(truth: TruthTable, hidden: Hidden, template: ReducedScan, rng: np.random.Generator) -> ReducedScan:
     """The map of one bead of this truth: its speed, sample, lift and noise drawn anew, in the frame of the template's bead."""
     scan, place = template.scan, list_places(truth.campaign)[template.scan.name]
     speed = scan.speed.value + scan.speed.sigma * rng.standard_normal()
     p_m = hidden.p_m * math.exp(SCATTER * rng.standard_normal())
     setting = set_nominal_drop(truth.campaign, _bare(scan.projectile), speed, p_m, TRUTH_SCAN_CELLS)
-    instrument = Instrument()
-    if effect is not None:
-        setting = effect.apply(setting, hidden.values, place)
-        instrument = effect.apply_to_instrument(instrument, hidden.values, place)
-    run = simulate(setting)
+    instrument = truth.instrument(hidden, place)
+    run = simulate(truth.apply(hidden.effects, setting, place))
     tip = run.penetration_depth - LIFT * rng.exponential()
     frame = replace(template.map, z=template.map.z - (tip - template.map.tip_depth), tip_depth=tip)
     blur = math.hypot(template.point_spread, instrument.ct_blur)

@@ -1,0 +1,67 @@
+"""Two hidden effects at once: both are in what was filmed, and only what costs runs is simulated."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labsim.campaign import read_campaign
+from labsim.inference.curves import encode_run
+from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.sph import simulate
+
+CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
+FRICTION, PIXELS = {"contact_friction": {"mu": 0.5}}, {"pixel_scale": {"factor": 1.05}}
+
+
+class TwoRuns:
+    """Stands for a store: one run with friction, one without, whatever else is asked for."""
+
+    def __init__(self):
+        self.settings, self.runs = [], {}
+
+    def get_many(self, settings, **_):
+        self.settings += settings
+        for setting in settings:
+            friction = setting.material.contact_friction
+            if friction not in self.runs:
+                spacing = setting.projectile.tip_radius / 4
+                self.runs[friction] = simulate(setting.replace(spacing=spacing, impact_speed=0.3))
+        return [self.runs[setting.material.contact_friction] for setting in settings]
+
+
+@pytest.fixture(scope="module")
+def truth():
+    campaign = read_campaign(CAMPAIGN)
+    table = TruthTable(replace(campaign, drops=campaign.drops[:1], scans=()), TwoRuns())
+    table.prepare([Hidden({**PIXELS, **FRICTION}), Hidden(PIXELS), Hidden(FRICTION)])
+    return table
+
+
+def film(truth, hidden):
+    return measure_hidden(truth, hidden, np.random.default_rng(11), scans=0).drops[0]
+
+
+def test_a_pair_is_named_in_one_order():
+    assert Hidden().cause == "none"
+    assert Hidden({**PIXELS, **FRICTION}).cause == Hidden({**FRICTION, **PIXELS}).cause
+
+
+def test_a_pair_has_the_runs_of_the_one_that_costs_runs(truth):
+    frictions = [setting.material.contact_friction for setting in truth.store.settings]
+    nodes = len(frictions) // 4  # three strengths without, the middle one with it, once for pair and single
+    assert frictions == 3 * nodes * [0.0] + nodes * [0.5]
+    drop = truth.campaign.drops[0]
+    plain, rough = (encode_run(truth.store.runs[mu]) for mu in (0.0, 0.5))
+    assert abs(rough[0] - plain[0]) > 0.02  # of ln depth: the friction is felt
+    for effects, expected in (({**PIXELS, **FRICTION}, rough), (FRICTION, rough), (PIXELS, plain)):
+        code = truth.code(Hidden(effects), drop.projectile, np.log(1300.0), np.log(0.3))
+        assert code == pytest.approx(expected, abs=1e-9)
+
+
+def test_both_of_a_pair_are_in_the_film(truth):
+    both, rough, scaled = (film(truth, Hidden(e)) for e in ({**PIXELS, **FRICTION}, FRICTION, PIXELS))
+    noise = 0.1 * both.drop.camera.pixel_size  # of the row of the surface and of the deepest frame
+    assert both.depth.max() == pytest.approx(rough.depth.max() / 1.05, abs=noise)
+    assert both.depth.max() < scaled.depth.max() - 5 * noise
