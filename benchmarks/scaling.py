@@ -3,7 +3,8 @@
 Each arrangement does the same axisymmetric drops, at the spacing of a fit, into an empty store. ``ratio`` is wall time
 against one worker; on a machine that others use too it says little, so ``busy`` stands beside it: the share of the workers'
 time that was spent within runs. Two workers that are busy 0.95 of the time are worth 1.9 where two cores are free. ``CPU``
-is the time of all processes of an arrangement, the scheduler's included.
+is the time of all processes of an arrangement, the scheduler's included. Dask's statistical profiler is off, as docs/cluster.md
+says (``--dask-profiler`` leaves it on).
 ``--coarse`` takes runs of some 30 ms instead (a/dx = 4, grains ten times softer), which show what comes with every run.
 """
 
@@ -62,7 +63,9 @@ def main() -> None:
     )
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--coarse", action="store_true")
+    parser.add_argument("--dask-profiler", action="store_true")
     given = parser.parse_args()
+    os.environ["DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED"] = str(given.dask_profiler)
     settings = make_sweep(given.runs, given.coarse)
     warm_up()
     load = os.getloadavg()[0]
@@ -81,7 +84,7 @@ def main() -> None:
         else:
             with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
                 address = cluster.scheduler_address
-                measure(make_sweep(2, True), folder / "warm dask", 2, address)
+                measure(make_sweep(8, True), folder / "warm dask", 2, address)
                 rows.append(("two Dask workers", *measure(settings, folder / "dask", 2, address)))
     print(f"{given.runs} runs, {os.cpu_count()} cores, load {load:.1f} of others before")
     print("| workers | wall | ratio | busy | CPU |\n| --- | --- | --- | --- | --- |")
