@@ -1,4 +1,4 @@
-"""Largest memory of a command with its workers together: python benchmarks/memory.py [--full] [-- labsim arguments]
+"""Largest memory and CPU time of a command with its workers together: python benchmarks/memory.py [--full] [-- labsim arguments]
 
 Proportional set sizes of all its processes, summed ten times a second, so that shared pages count once. Without
 arguments the quick commands are measured; ``--full`` adds calibrate and diagnose of two drops.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -17,10 +18,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 
-def measure(arguments: list[str], store: Path) -> tuple[float, float, int]:
-    """(largest memory in bytes, wall s, exit status) of one command."""
+def measure(arguments: list[str], store: Path) -> tuple[float, float, float, int]:
+    """(largest memory in bytes, wall s, CPU s, exit status) of one command."""
     environment = {**os.environ, "LABSIM_STORE": str(store), "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
-    began = time.perf_counter()
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     process = subprocess.Popen(
         [sys.executable, "-m", "labsim", *arguments], env=environment, stdout=subprocess.DEVNULL
     )
@@ -28,7 +29,9 @@ def measure(arguments: list[str], store: Path) -> tuple[float, float, int]:
     while process.poll() is None:
         largest = max(largest, sum(_size(pid) for pid in _family(process.pid)))
         time.sleep(0.1)
-    return largest, time.perf_counter() - began, process.returncode
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return largest, time.perf_counter() - began, used, process.returncode
 
 
 def _family(pid: int) -> list[int]:
@@ -81,12 +84,14 @@ def main() -> None:
             commands["diagnose, 2 drops, 2 workers"] = ["diagnose", campaign, "--workers", "2"]
         if given.arguments:
             commands = {" ".join(given.arguments): given.arguments}
-        print("| command | largest memory | wall |\n| --- | --- | --- |")
+        print("| command | largest memory | wall | CPU |\n| --- | --- | --- | --- |")
         for number, (label, arguments) in enumerate(commands.items()):
             out = [] if arguments[0] == "check" or "-o" in arguments else ["-o", str(folder / f"out{number}")]
-            largest, wall, status = measure([*arguments, *out, "--quiet"], folder / "store")
+            largest, wall, used, status = measure([*arguments, *out, "--quiet"], folder / "store")
             failed = f", status {status}" if status else ""
-            print(f"| {label} | {largest / 2**20:.0f} MiB | {wall:.0f} s{failed} |", flush=True)
+            print(
+                f"| {label} | {largest / 2**20:.0f} MiB | {wall:.0f} s{failed} | {used:.0f} s |", flush=True
+            )
 
 
 if __name__ == "__main__":

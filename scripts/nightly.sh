@@ -33,7 +33,7 @@ for part in $parts; do
     slow) run python -m pytest -q -n 2 -m slow ;;
     mutants) run env LABSIM_MUTANTS=1000 python -m pytest -q -s tests/faults/test_mutants.py ;;
     kills)
-      for command in simulate calibrate track ct; do
+      for command in simulate calibrate diagnose track ct; do
         run python benchmarks/kill_and_resume.py "$command" --kills 10 --seed "$(date +%j)"
       done
       ;;
