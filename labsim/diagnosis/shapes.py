@@ -119,7 +119,8 @@ def merge_variants(
         if best != base:
             _take_name(bench, best, base)
         if best in fitted:
-            merged.append(replace(_rename(fitted[best], best, base), evidence=mean))
+            over = weigh_shapes([fitted[name] for name in variants if name in fitted], fitted[best])
+            merged.append(replace(_rename(fitted[best], best, base), evidence=mean, over_shapes=over))
         for name in variants:
             if name != base:
                 bench.effects.pop(name, None)
@@ -138,6 +139,14 @@ def merge_variants(
         cosines=screening.cosines[np.ix_(positions, positions)],
         fingerprints=screening.fingerprints[:, positions],
     )
+
+
+def weigh_shapes(variants: Sequence[Fit], best: Fit) -> tuple[float, float]:
+    """Of ln p_m over variants by their evidence: mean minus the best one's, and standard deviation."""
+    log_p_m = np.array([fit.log_p_m for fit in variants])
+    weight = np.exp([fit.evidence - best.evidence for fit in variants])
+    mean = float(np.average(log_p_m, weights=weight))
+    return mean - best.log_p_m, math.sqrt(float(np.average((log_p_m - mean) ** 2, weights=weight)))
 
 
 def _evidence(

@@ -220,9 +220,12 @@ def sample_fit(
     backend: Path | None = None,
     progress: Progress | None = None,
 ) -> Posterior:
-    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors."""
+    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors.
+
+    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the other shapes.
+    """
     target = make_target(bench, fit)
-    return sample(
+    posterior = sample(
         target.log_probability,
         target.names,
         np.clip(target.misfit.centre, *target.bounds.T),
@@ -232,6 +235,12 @@ def sample_fit(
         backend=backend,
         progress=progress,
     )
+    moved, width = fit.over_shapes
+    if width > 0.0:
+        p_m = posterior.data.posterior["p_m_Pa"]
+        other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
+        posterior.data.posterior["p_m_Pa"] = p_m * np.exp(other)
+    return posterior
 
 
 def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[float, float]:

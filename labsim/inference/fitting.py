@@ -61,6 +61,8 @@ class Fit:
     linear: Linearised
     models: list[DropModel]
     scan_speeds: tuple[float, ...] = ()  # ln of the impact speeds of the scans, at their best
+    # of ln p_m over the shapes of the effect that were fitted, by their evidence: mean minus this one's, standard deviation
+    over_shapes: tuple[float, float] = (0.0, 0.0)
 
 
 def fit_hypothesis(
