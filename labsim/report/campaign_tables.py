@@ -202,9 +202,10 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     if others := found.verdict.probabilities[len(worth) :]:
         lines.append(f"  {sum(p for _, p in others):11.3f}  the {len(others)} others together")
     gain = found.gain
+    nearest = "the nearest listed cause, " if found.verdict.word == "unknown" else ""
     lines.append(
         f"  held-out drops: rms {gain.rms_nominal * 1e6:.1f} µm nominal, {gain.rms_extended * 1e6:.1f} µm with "
-        f"{' + '.join(found.best.hypothesis) or 'nothing added'}, {gain.rms_noise * 1e6:.1f} µm expected; ln score "
+        f"{nearest}{' + '.join(found.best.hypothesis) or 'nothing added'}, {gain.rms_noise * 1e6:.1f} µm expected; ln score "
         f"{gain.log_score_difference:+.1f} ± {gain.log_score_difference_sigma:.1f}"
     )
     lines.append(

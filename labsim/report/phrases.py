@@ -39,6 +39,11 @@ def say_p_value(value: float) -> str:
     return f"{mantissa}·10⁻{str(-int(exponent)).translate(SUPERSCRIPT)}"
 
 
+def equate(said: str) -> str:
+    """What stands behind a symbol: "= 0.3", but "< 10⁻³⁰⁰" as it is."""
+    return said if said[:1] in "<>≈" else f"= {said}"
+
+
 def say_count(number: int, noun: str) -> str:
     return f"{number or 'no'} {noun}{'' if number == 1 else 's'}"
 
