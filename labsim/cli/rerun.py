@@ -22,6 +22,7 @@ SUMMARIES = (
     "tracks.json",
     "scans.json",
 )
+REPEATABLE = ("simulate", "calibrate", "diagnose", "demo", "track", "ct")  # write into --out alone
 DIFFERENT = 1  # exit status
 
 
@@ -42,7 +43,6 @@ def rerun(
     """Repeat what made OUT in a new folder and compare every number; exit status 0 the same, 1 different."""
     made_by = read_made_by(made)
     command = made_by["command"][1:]
-    changed = list_changes(made_by)
     folder = options.make_output_folder(out, made.resolve(), "rerun")
     again = folder / "again"
     arguments = strip(command, keep_store=stored)
@@ -53,6 +53,7 @@ def rerun(
     if not stored:
         os.environ["LABSIM_STORE"] = str(folder / "runs")
     repeat(arguments, Path(made_by["folder"]), quiet)
+    changed = list_changes(made_by)
     found = compare_folders(made, again, tolerance)
     summary = {
         "same": found.same,
@@ -79,7 +80,7 @@ def read_made_by(folder: Path) -> dict[str, Any]:
             continue
         try:
             made_by = json.loads(file.read_text(encoding="utf-8")).get(_provenance.KEY)
-        except (OSError, ValueError, AttributeError) as trouble:
+        except (OSError, ValueError, AttributeError, RecursionError) as trouble:
             raise LabsimError(
                 file, "", f"cannot be read ({trouble}); it is not a summary of labsim"
             ) from None
@@ -88,14 +89,29 @@ def read_made_by(folder: Path) -> dict[str, Any]:
             not isinstance(made_by.get(key), kind) for key, kind in shape.items()
         ):
             raise LabsimError(file, _provenance.KEY, "is missing; make the result with this version first")
-        command = made_by["command"]
-        if len(command) < 2 or command[1] == "rerun" or not all(isinstance(each, str) for each in command):
-            raise LabsimError(file, f"{_provenance.KEY}.command", f"{command!r} is not a command of labsim")
+        _check_command(file, made_by)
         for path in made_by["inputs"]:
             if not Path(path).exists():
                 raise LabsimError(path, "", f"is gone; {folder} was made from it")
         return made_by
     raise LabsimError(folder, "OUT", f"holds no summary of labsim ({', '.join(SUMMARIES)})")
+
+
+def _check_command(file: Path, made_by: dict[str, Any]) -> None:
+    """A summary is a file like any other: whatever it says, nothing is run but what makes such a summary."""
+    command = made_by["command"]
+    if not all(isinstance(each, str) and "\0" not in each for each in command) or len(command) < 2:
+        raise LabsimError(
+            file, f"{_provenance.KEY}.command", "is not a command of labsim; make the result again"
+        )
+    if command[1] not in REPEATABLE:
+        said = f"{command[1][:80]!r} is not repeated; only {', '.join(REPEATABLE)} are"
+        raise LabsimError(file, f"{_provenance.KEY}.command", said)
+    for key in ("versions", "inputs"):
+        for name, value in made_by[key].items():
+            if not isinstance(value, str):
+                said = f"{value!r:.80} is not a text; make the result again"
+                raise LabsimError(file, f"{_provenance.KEY}.{key}.{name}", said)
 
 
 def strip(command: list[str], *, keep_store: bool) -> list[str]:

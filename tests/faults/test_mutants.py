@@ -5,6 +5,7 @@ LABSIM_MUTANTS=1000 pytest tests/faults/test_mutants.py        the nightly numbe
 
 from __future__ import annotations
 
+import copy
 import importlib
 import json
 import os
@@ -49,6 +50,14 @@ NASTY = st.sampled_from(
         "nan", "inf", "-inf", "-1", "0", "-0.0", "1e308", "1e-308", "9223372036854775807", "1e4", "0.001", "true", '""',
         '"../../outside/evil"', '"/outside/evil"', '"."', '".."', '"\\u0000"', '"track.csv"', '"none"', "[]", "[1.0]",
         "[nan, inf]", "[6000.0, 300.0]", "{}", "{ a = 1 }", "1979-05-27", '"' + "x" * 5000 + '"', '"ä\\n"', "[[[[]]]]",
+    ]
+)  # fmt: skip
+EVIL = st.sampled_from(
+    [
+        None, True, -1, 1e308, float("nan"), "", ".", "../outside", "/", "\0", "x" * 5000, "ä\n", [], {}, [[]], ["a"],
+        {"/": "a"}, {"a": 1}, ["labsim", "new", "evil"], ["labsim", "rerun", "result"], ["labsim", "--version"],
+        ["labsim", "runs", "prune", "--everything"], ["labsim", "simulate", "-oevil"], ["labsim", "calibrate", "/"],
+        "--out=evil", "--store=evil", "-oevil", "--workers", "--spacings",
     ]
 )  # fmt: skip
 PLACE = st.floats(0.0, 1.0, exclude_max=True)
@@ -107,6 +116,32 @@ def change_text(text: str, change: tuple[str, float, str]) -> str:
         fields[int(place * 997) % len(fields)] = extra
         lines[at] = ",".join(fields)
     return "\n".join(lines) + "\n"
+
+
+def change_json(text: str, changes: list[tuple[str, float, object]]) -> str:
+    """A JSON file with values replaced, taken out or added, mostly in what says how it was made: JSON again."""
+    made = json.loads(text)
+    for kind, place, extra in changes:
+        places: list[tuple] = []
+        stack = (
+            [made] if place < 0.2 else [made["made_by"]] if isinstance(made.get("made_by"), dict) else [made]
+        )
+        while stack:
+            at = stack.pop()
+            for key in list(at) if isinstance(at, dict) else range(len(at)):
+                places.append((at, key))
+                if isinstance(at[key], (dict, list)):
+                    stack.append(at[key])
+        if not places:
+            continue
+        at, key = places[int(place * 997) % len(places)]
+        if kind == "without":
+            del at[key]
+        elif kind == "added" and isinstance(at, list):
+            at.insert(key, copy.deepcopy(extra))
+        else:
+            at[key] = copy.deepcopy(extra)
+    return json.dumps(made)
 
 
 def change_file(file: Path, change: tuple | list) -> None:
@@ -299,6 +334,29 @@ def test_one_text_file(kind: str, inputs: Path, root: Path) -> None:
             counts[kind, 1] += 1
         else:
             judge(kind, found, changes)
+
+    run()
+
+
+def test_what_a_summary_says_it_was_made_by(inputs: Path, root: Path) -> None:
+    """rerun repeats a command that it reads from a file: only what writes into its output folder."""
+
+    @mutants(
+        "made_by",
+        st.lists(
+            st.tuples(st.sampled_from(["value", "without", "added"]), PLACE, EVIL), min_size=1, max_size=2
+        ),
+    )
+    def run(changes: list) -> None:
+        folder = fresh(root, inputs / "result", "result")
+        file = folder / "result" / "run.json"
+        file.write_text(change_json(file.read_text(), changes))
+        found = attempt(["rerun", "result", "-o", "out", "--quiet"], folder)
+        if found.status == 1:  # different, and says so
+            assert "Traceback" not in found.said and not found.strays, (changes, found)
+            counts["made_by", 1] += 1
+        else:
+            judge("made_by", found, changes)
 
     run()
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from labsim.cli._compare import compare_folders
+from labsim.cli.rerun import read_made_by
+from labsim.errors import LabsimError
 
 QUICK = "--geometry planar --set material.bulk_modulus_Pa=4500 --spacing-um 125 --speed-m-s 0.3".split()
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -67,3 +69,20 @@ def test_inputs_that_changed_are_named(begin, tmp_path: Path, campaign: Path) ->
     process = begin("rerun", tmp_path / "out", "-o", tmp_path / "again")
     printed, _said = process.communicate(timeout=300)
     assert process.returncode == 0 and f"changed since: {drop}" in printed
+
+
+@pytest.mark.parametrize(
+    "command", [["new", "evil"], ["runs", "prune", "--everything"], ["rerun", "."], ["--version"]]
+)
+def test_a_summary_cannot_have_anything_run(tmp_path: Path, command: list[str]) -> None:
+    """Only what writes into an output folder of its own is repeated, whatever a run.json says."""
+    made_by = {
+        "command": ["labsim", *command],
+        "folder": str(tmp_path),
+        "versions": {},
+        "solver": "",
+        "inputs": {},
+    }
+    (tmp_path / "run.json").write_text(json.dumps({"made_by": made_by}))
+    with pytest.raises(LabsimError, match="is not repeated"):
+        read_made_by(tmp_path)
