@@ -66,7 +66,11 @@ def fit_emulator(inputs: FloatArray, outputs: FloatArray, names: tuple[str, ...]
     q, r = np.linalg.qr(terms)
     coefficients = np.linalg.solve(r, q.T @ np.log(outputs))
     leverage = np.sum(q**2, axis=1)[:, None]
-    left_out = (np.log(outputs) - terms @ coefficients) / (1.0 - leverage)
+    # a run that alone carries a term cannot be left out, and says nothing of the error
+    can = leverage[:, 0] < 1.0 - 1e-9
+    left_out = (np.log(outputs) - terms @ coefficients)[can] / (1.0 - leverage[can])
+    if not can.any():
+        raise InferenceError("", "emulator", "no run can be left out to tell its error; add runs")
     return Emulator(
         names=names,
         centre=centre,
