@@ -6,6 +6,7 @@ sections with different meanings, values may hold '=' and carry a suffix such as
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,9 +35,19 @@ class SkyScanLog:
         return None
 
     def number(self, key: str, *sections: str) -> float | None:
+        """None where the key is missing or has no value. Raises MeasurementError where the value is not a finite number."""
         text = self.text(key, *sections)
-        match = re.match(r"\s*([-+]?\d+[.,]?\d*(?:[eE][-+]?\d+)?)", text or "")
-        return float(match.group(1).replace(",", ".")) if match else None
+        if text is None or text.strip().lower() in ("", "-", "off", "none", "n/a"):
+            return None
+        match = re.match(r"\s*([-+]?\d+[.,]?\d*(?:[eE][-+]?\d+)?)", text)
+        value = float(match.group(1).replace(",", ".")) if match else math.nan
+        if not math.isfinite(value):
+            raise MeasurementError(
+                self.path,
+                key,
+                f"is {text[:40]!r}, not a number; correct the log or move it out of the folder",
+            )
+        return value
 
     def switch(self, key: str, *sections: str) -> bool | None:
         """ON/OFF, "ON (3)", 1/0; None where the key is missing."""
@@ -44,7 +55,8 @@ class SkyScanLog:
         if text is None:
             return None
         word = text.strip().split("(")[0].strip().lower()
-        return word in ("on", "yes", "true") or (word.replace(".", "").isdigit() and float(word) != 0)
+        stated = re.fullmatch(r"\d+\.?\d*", word)
+        return word in ("on", "yes", "true") or (stated is not None and float(word) != 0)
 
     @property
     def voxel(self) -> float | None:
@@ -106,13 +118,13 @@ def check_log(log: SkyScanLog, count: int, shape: tuple[int, int], dtype: np.dty
         raise MeasurementError(
             log.path,
             "Sections Count",
-            f"is {int(stated)} but there are {count} slices; put the missing ones back",
+            f"is {stated:.15g} but there are {count} slices; put the missing ones back",
         )
     for key, size in (("result image width (pixels)", shape[1]), ("result image height (pixels)", shape[0])):
         value = log.number(key, "reconstruction")
         if value is not None and int(value) != size:
             raise MeasurementError(
-                log.path, key, f"is {int(value)} but the slices have {size}; this log belongs to other slices"
+                log.path, key, f"is {value:.15g} but the slices have {size}; this log belongs to other slices"
             )
     kind = (log.text("result file type", "reconstruction") or "").upper()
     bits = 8 * dtype.itemsize

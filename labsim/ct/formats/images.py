@@ -72,7 +72,9 @@ def read_rescale(file: Path) -> dict:
         )
     found = {}
     for name in ("slope", "offset"):
-        match = re.search(rf"{name}[^-+0-9.]+([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)", text, re.IGNORECASE)
+        match = re.search(
+            rf"{name}[^-+0-9.]+([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)(?![0-9.])", text, re.IGNORECASE
+        )
         if match:
             found[name] = float(match.group(1))
     return found if len(found) == 2 else {}
