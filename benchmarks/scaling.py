@@ -22,11 +22,11 @@ from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
 
 
-def make_sweep(count: int, coarse: bool) -> list[DropSetting]:
-    """Drops of a rod at one speed, p_m from 1 to 4 kPa, a/dx = 5, or a/dx = 4 and soft grains."""
+def make_sweep(count: int, coarse: bool, cells: int = 5) -> list[DropSetting]:
+    """Drops of a rod at one speed, p_m from 1 to 4 kPa, a/dx = cells, or a/dx = 4 and soft grains."""
     rod = Projectile("hemisphere", 5e-4, 1.33e-6)
     dust = Material(bulk_modulus=4500.0 if coarse else 45000.0)
-    spacing = 5e-4 / (4 if coarse else 5)
+    spacing = 5e-4 / (4 if coarse else cells)
     return [
         DropSetting(rod, 0.3, dust.replace(p_m=1000.0 * 4.0 ** (k / max(count - 1, 1))), spacing=spacing)
         for k in range(count)
@@ -62,11 +62,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--runs", type=int, default=40)
+    parser.add_argument("--cells", type=int, default=5, help="a/dx of the runs")
     parser.add_argument("--coarse", action="store_true")
     parser.add_argument("--dask-profiler", action="store_true")
     given = parser.parse_args()
     os.environ["DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED"] = str(given.dask_profiler)
-    settings = make_sweep(given.runs, given.coarse)
+    settings = make_sweep(given.runs, given.coarse, given.cells)
     warm_up()
     load = os.getloadavg()[0]
     rows: list[tuple[str, float, float, float]] = []
