@@ -27,7 +27,7 @@ from scipy.stats import beta
 
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
-from labsim.diagnosis.campaign import CONFUSABLE, Judgement, judge_campaign
+from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
 from labsim.effects import Effect
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
@@ -105,12 +105,6 @@ def judge_hidden(
     }
 
 
-def judge_nominal(campaign: Campaign, store: RunStore, truth: TruthTable, workers: int) -> Judgement:
-    """A campaign with nothing hidden: its screening says how long every effect's fingerprint is."""
-    measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
-    return judge_campaign(*prepare(campaign, store, workers=workers, measurements=measurements))
-
-
 def set_strength(effect: Effect, signal: float, sigma: float, sign: int) -> dict[str, float] | None:
     """Values of an effect that is this many standard deviations of its fingerprint; None beyond its limits."""
     parameter = effect.amplitudes[0]
@@ -124,7 +118,8 @@ def choose_amplitudes(
     campaign: Campaign, store: RunStore, truth: TruthTable, sigmas: list[float], workers: int
 ) -> list:
     """(hidden, strength) of every effect at every strength that its limits allow, with alternating signs."""
-    found = judge_nominal(campaign, store, truth, workers)
+    measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
+    found = judge_campaign(*prepare(campaign, store, workers=workers, measurements=measurements))
     signal = {score.name: score.signal for score in found.screening.scores}
     chosen = []
     for number, (name, effect) in enumerate(sorted(found.bench.effects.items())):
