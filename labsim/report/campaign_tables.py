@@ -176,6 +176,8 @@ def say_verdict(found: Diagnosis) -> str:
         parameter = effect.amplitudes[0]
         value = parameter.null + found.best.values.get(name, 0.0)
         amount = f"{value:.3g} {parameter.unit}".removesuffix(" 1")
+        for shape in (each for each in effect.parameters if each.shape):  # eta s^n says nothing without n
+            amount += f", {shape.name} = " + f"{shape.null:.3g} {shape.unit}".removesuffix(" 1")
         title = effect.title[0].lower() + effect.title[1:]
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     return (
