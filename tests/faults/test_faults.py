@@ -29,6 +29,7 @@ from labsim.sph import DropRun, DropSetting
 SOFT = Material(bulk_modulus=4500.0)
 SWEEP = "--geometry planar --set material.bulk_modulus_Pa=4500 --spacing-um 125 --speed-m-s 0.3 --spacings 3".split()
 ONE = SWEEP[:-2]
+LONG_SWEEP = [*ONE, "--spacings", "6"]  # its finest run still goes on, seconds after others are stored
 
 
 def small_drop(speed: float = 0.3) -> DropSetting:
@@ -78,13 +79,13 @@ def one_error(process: subprocess.Popen[str], status: int = 2) -> str:
 
 
 def test_an_interrupt_keeps_what_is_done_and_says_one_line(begin, tmp_path: Path) -> None:
-    process = begin("simulate", *SWEEP, "-o", tmp_path / "out", "--workers", 2)
+    process = begin("simulate", *LONG_SWEEP, "-o", tmp_path / "out", "--workers", 2)
     wait_for(tmp_path / "store", 1, process)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
     assert "start the same command again" in one_error(process, 130)
     store = RunStore(tmp_path / "store")
     assert store.verify() == [] and len(store.index()) >= 1
-    again = begin("simulate", *SWEEP, "-o", tmp_path / "out", "--workers", 2, "--quiet")
+    again = begin("simulate", *LONG_SWEEP, "-o", tmp_path / "out", "--workers", 2, "--quiet")
     assert again.wait(timeout=120) == 0
 
 
