@@ -93,10 +93,17 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
         _fit_blur(box, fit, radius, level, top, directions, outside, tree, region)
         for region in ("lateral", "axial")
     )
-    if max(lateral, axial) > WIDE:  # nan where no axial edge is seen
-        lateral, axial = _fit_wide_blur(stack, fit + origin, stated, level, top, directions, (lateral, axial))
+    if find_widest(lateral, axial) > WIDE:
+        lateral, axial = _fit_wide_blur(
+            stack, fit + origin, stated, level, top, directions, tree, (lateral, axial)
+        )
     x, y, k = (fit + origin).tolist()
     return Bead((x, y, k), radius, stated, rms, lateral, axial, saturated, tuple(warnings))
+
+
+def find_widest(lateral: float, axial: float) -> float:
+    """The wider of two blurs; where an edge gives none (NaN), the other."""
+    return float(np.nanmax([lateral, axial, 0.0]))
 
 
 def _bead_level(scan: Scan) -> float:
@@ -287,24 +294,23 @@ def _fit_blur(
 
 def _fit_wide_blur(
     stack: SliceStack, centre: FloatArray, stated: float, level: float, top: float, directions: FloatArray,
-    blur: tuple[float, float],
+    tree: cKDTree, blur: tuple[float, float],
 ) -> tuple[float, float]:  # fmt: skip
     """The same where the edge reaches to where its outside was looked for: further out, about the stated radius."""
     for _ in range(WIDE_PASSES):
-        reach = 3.0 * np.nanmax(blur)
+        before = find_widest(*blur)
+        reach = 3.0 * before
         box, origin = _cut_box(stack, tuple(centre), int(np.ceil(stated + reach + 3)))
         middle = centre - origin
         along = stated + reach + np.arange(0.0, 2.0, 0.5)
         points = middle + along[None, :, None] * directions[:, None, :]
         grey = ndimage.map_coordinates(box, points.reshape(-1, 3).T, order=1, mode="nearest")
         outside = grey.reshape(len(directions), -1).mean(1)
-        tree = cKDTree(directions)
         lateral, axial = (
             _fit_blur(box, middle, stated, level, top, directions, outside, tree, region, reach, (0.2, 0.05))
             for region in ("lateral", "axial")
         )
-        settled = abs(np.nanmax((lateral, axial)) - np.nanmax(blur)) < 0.05 * np.nanmax(blur)
         blur = (lateral, axial)
-        if settled:
+        if abs(find_widest(*blur) - before) < 0.05 * before:
             break
     return blur

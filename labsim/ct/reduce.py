@@ -11,7 +11,7 @@ from ..errors import MeasurementError
 from ..records import FillingMap, FloatArray, Measured, Scan
 from .artefacts import Cupping, fit_cupping, remove_rings
 from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
-from .bead import WIDE, Bead, find_bead
+from .bead import WIDE, Bead, find_bead, find_widest
 from .stack import SliceStack, open_stack
 from .surface import Surface, find_surface
 
@@ -111,7 +111,7 @@ def reduce_scan(
     report(0, 4, "bead")
     bead = find_bead(stack, scan)
     warnings += bead.warnings
-    blur = float(np.nanmax([bead.blur_lateral, bead.blur_axial, 0.0]))
+    blur = find_widest(bead.blur_lateral, bead.blur_axial)
     if blur > WIDE and guard < GUARD_BLURS * blur:
         guard = GUARD_BLURS * blur
         warnings.append(
