@@ -9,16 +9,13 @@ of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. P
 from __future__ import annotations
 
 import argparse
-import json
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from own_campaigns import interval, open_campaign
+from own_campaigns import append_rows, interval, open_campaign, read_rows
 
 from labsim.ct.reduce import ReducedScan
 from labsim.inference.calibrate import prepare, sample_fit
@@ -66,20 +63,17 @@ def main() -> None:
     campaign, templates = open_campaign("", True)
     truth = TruthTable(campaign, RunStore(options.store), workers=options.workers)
     truth.prepare([])
-    done = {json.loads(line)["seed"] for line in log.read_text().splitlines()} if log.exists() else set()
+    done = {row["seed"] for row in read_rows(log)}
     jobs = [
         (campaign, templates, options.store, replace(truth, store=None), seed)
         for seed in range(70_000, 70_000 + options.campaigns)
         if seed not in done
     ]
-    with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
-        for number, row in enumerate(pool.map(calibrate_hidden, jobs), start=1):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            print(
-                f"{number}/{len(jobs)}: {row['p_m']:.0f} in {row['low']:.0f} to {row['high']:.0f}", flush=True
-            )
-    table = pd.DataFrame([json.loads(line) for line in log.read_text().splitlines()])
+    append_rows(
+        log, calibrate_hidden, jobs, options.workers,
+        lambda row: f": {row['p_m']:.0f} in {row['low']:.0f} to {row['high']:.0f}",
+    )  # fmt: skip
+    table = pd.DataFrame(read_rows(log))
     print(f"p_m in its 90 % interval {interval((table.low < table.p_m) & (table.p_m < table.high))}")
     print(f"goodness of fit below 0.05 {interval(table.goodness < 0.05)}")
     print(f"ranks of the truth in tenths {np.histogram(table['rank'], np.linspace(0, 1, 11))[0].tolist()}")

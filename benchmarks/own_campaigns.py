@@ -15,10 +15,12 @@ import argparse
 import json
 import math
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -179,6 +181,22 @@ def report(rows: list[dict]) -> None:
     print(f"median wall {table.wall.median():.1f} s")
 
 
+def read_rows(log: Path) -> list[dict]:
+    """What earlier calls have written, one line a campaign."""
+    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def append_rows(
+    log: Path, judge: Callable[[Any], dict], jobs: Sequence, workers: int, say: Callable[[dict], str]
+) -> None:
+    """Judge the jobs side by side; every row is written as it comes, so that a second call goes on."""
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
+        for number, row in enumerate(pool.map(judge, jobs), start=1):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(f"{number}/{len(jobs)}{say(row)}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -210,25 +228,17 @@ def main() -> None:
     draw = np.random.default_rng(20090101)
     plan = [(Hidden(), 1000 + k, 0.0) for k in range(options.nulls)]
     plan += [(h, 5000 + 100 * n + k, s) for n, (h, s) in enumerate(chosen) for k in range(options.each)]
-    done = (
-        {(r["cause"], r["seed"]) for r in map(json.loads, log.read_text().splitlines())}
-        if log.exists()
-        else set()
-    )
+    done = {(row["cause"], row["seed"]) for row in read_rows(log)}
     jobs = []
     for hidden, seed, sigma in plan:
         hidden = replace(hidden, p_m=float(np.exp(np.log(1300.0) + 0.15 * draw.standard_normal())))
         if (hidden.cause, seed) not in done:
             jobs.append((campaign, templates, options.store, replace(truth, store=None), hidden, seed, sigma))
-    with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
-        for number, row in enumerate(pool.map(judge_hidden, jobs), start=1):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            print(
-                f"{number}/{len(jobs)} {row['cause']} {row['strength']:.0f}: {row['first']} {row['probability']:.2f}",
-                flush=True,
-            )
-    report([json.loads(line) for line in log.read_text().splitlines()])
+    append_rows(
+        log, judge_hidden, jobs, options.workers,
+        lambda row: f" {row['cause']} {row['strength']:.0f}: {row['first']} {row['probability']:.2f}",
+    )  # fmt: skip
+    report(read_rows(log))
 
 
 if __name__ == "__main__":
