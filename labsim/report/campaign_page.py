@@ -20,7 +20,7 @@ from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
-from .phrases import say_p_value, say_probability
+from .phrases import say_p_value, say_probability, state_p_value
 from .provenance import trace_origin
 
 SAID = {"none": "the nominal model", "unknown": "no listed cause"}
@@ -121,7 +121,7 @@ def write_calibration_page(
     sentence = (
         f"p_m = {q['q50'] / 1e3:.2f} kPa, 90 % between {q['q05'] / 1e3:.2f} and {q['q95'] / 1e3:.2f} kPa, from "
         f"{len(views)} drops; the simulation {'explains' if explains else 'does not explain'} them "
-        f"(p = {say_p_value(found.p_value)})" + ("." if explains else "; labsim diagnose asks why.")
+        f"({state_p_value(found.p_value)})" + ("." if explains else "; labsim diagnose asks why.")
     )
     others = [name for name in found.posterior.names if name != "p_m_Pa"]
     tiles = [

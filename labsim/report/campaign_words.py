@@ -15,7 +15,7 @@ from .campaign_figures import say_projectile
 from .drop_views import DropView
 from .interactive import SIGNS
 from .page import show_number
-from .phrases import add_article, equate, list_names, say_count, say_p_value, say_range, shown_unit
+from .phrases import add_article, list_names, say_count, say_range, shown_unit, state_p_value
 
 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
@@ -75,7 +75,7 @@ def describe_calibration(
         "p_m says how hard the dust is to compress: its compressive strength is Σ = p_m ((φ − φ₁)/(φ₂ − φ))^(Δ ln 10). "
         f"{fit.points} data enter the likelihood (free fall averaged over eight frames; the stated heights count). The nominal "
         f"model, that of campaign.toml, leaves χ² = {fit.chi_square:.0f}; where it is right, data as far off come with a "
-        f"probability p {equate(say_p_value(p_value))}. "
+        f"probability {state_p_value(p_value)}. "
     )
     if drops > 1:
         words += (

@@ -39,9 +39,10 @@ def say_p_value(value: float) -> str:
     return f"{mantissa}·10⁻{str(-int(exponent)).translate(SUPERSCRIPT)}"
 
 
-def equate(said: str) -> str:
-    """What stands behind a symbol: "= 0.3", but "< 10⁻³⁰⁰" as it is."""
-    return said if said[:1] in "<>≈" else f"= {said}"
+def state_p_value(value: float) -> str:
+    """p = 0.31, p < 10⁻³⁰⁰."""
+    said = say_p_value(value)
+    return f"p {said}" if said[0] in "<>" else f"p = {said}"
 
 
 def say_count(number: int, noun: str) -> str:
