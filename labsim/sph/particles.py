@@ -25,14 +25,15 @@ WALL_LAYERS = 3  # of particles held still at the sides and the bottom
 def initial_filling_factor(setting: DropSetting, depth: FloatArray) -> FloatArray:
     """φ0 at a depth (m, positive downwards) below the surface, with crust and gradient."""
     crust = setting.crust_excess * np.exp(-depth / setting.crust_length) if setting.crust_excess else 0.0
-    return setting.filling_factor + crust + setting.filling_gradient * depth
+    return setting.filling_factor + crust + setting.filling_gradient * np.minimum(depth, setting.graded_depth)
 
 
 def _filling_above(setting: DropSetting, depth: FloatArray) -> FloatArray:
     """Integral of the initial filling factor from the surface to ``depth``, m."""
-    length = setting.crust_length
+    length, graded = setting.crust_length, np.minimum(depth, setting.graded_depth)
     crust = setting.crust_excess * length * (1 - np.exp(-depth / length)) if setting.crust_excess else 0.0
-    return setting.filling_factor * depth + crust + 0.5 * setting.filling_gradient * depth**2
+    gradient = setting.filling_gradient * (graded * depth - 0.5 * graded**2)
+    return setting.filling_factor * depth + crust + gradient
 
 
 def fill_at_rest(

@@ -9,6 +9,9 @@ from typing import Literal
 from ..errors import SimulationError
 from ..records import Material, Projectile
 
+LOOSEST = 0.005  # of φ over φ1, that a gradient leaves
+LEAST_GRADED = 3.0  # tip radii that a falling φ0 must fall through before it stays as it is
+
 
 @dataclass(frozen=True)
 class Numerics:
@@ -56,7 +59,7 @@ class DropSetting:
     pore_gas: float = 0.0  # Pa
     crust_excess: float = 0.0  # φ0 + crust_excess exp(-depth / crust_length)
     crust_length: float = 3.0e-4  # m
-    filling_gradient: float = 0.0  # 1/m, growth of φ0 with depth
+    filling_gradient: float = 0.0  # 1/m, growth of φ0 with depth, down to graded_depth
     side_friction: float = 0.0  # N/m (planar: N/m per metre), times the immersed length
     strength_shape: tuple[tuple[float, float], ...] = ()  # (φ, factor on Σ), linear between, constant beyond
     force_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m, upward force N), linear between
@@ -82,6 +85,13 @@ class DropSetting:
         depth = self.depth if self.depth is not None else max(6 * radius, 3 * radius + 1.5 * expected)
         cells = 2 * round(width / self.spacing / 2) if planar else round(width / self.spacing)
         return cells * self.spacing, round(depth / self.spacing) * self.spacing
+
+    @property
+    def graded_depth(self) -> float:
+        """Depth (m) from which on φ0 stays as it is: where a falling one comes near φ1, where there is no strength."""
+        if self.filling_gradient >= 0.0:
+            return math.inf
+        return max(self.filling_factor - self.material.phi_1 - LOOSEST, 0.0) / -self.filling_gradient
 
 
 def check_setting(setting: DropSetting) -> None:
@@ -112,10 +122,17 @@ def check_setting(setting: DropSetting) -> None:
         )
     low, high = material.phi_1, material.phi_2
     reachable = [setting.filling_factor, setting.filling_factor + setting.crust_excess]
-    reachable.append(setting.filling_factor + setting.filling_gradient * setting.extent[1])
+    graded = min(setting.extent[1], setting.graded_depth)
+    reachable.append(setting.filling_factor + setting.filling_gradient * graded)
     for phi in reachable:
         if not low < phi < high:
             refuse("filling_factor", f"{phi:.4g} lies outside ({low:.4g}, {high:.4g}), where Σ(φ) is defined")
+    if setting.graded_depth < LEAST_GRADED * projectile.tip_radius:
+        refuse(
+            "filling_gradient",
+            f"{setting.filling_gradient:.4g} per m leaves no strength {setting.graded_depth * 1e3:.3g} mm down, where "
+            f"the projectile acts; at least {LEAST_GRADED:g} tip radii must lie above that",
+        )
     if not material.p_m > 0:
         refuse("material.p_m", f"is {material.p_m!r} Pa; it must be positive")
     stiffness = material.bulk_modulus * (1 + 4 / 3 * material.shear_to_bulk)

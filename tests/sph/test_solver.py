@@ -11,7 +11,7 @@ import pytest
 
 from labsim.errors import SimulationError
 from labsim.records import Material, Projectile
-from labsim.sph import DropSetting, Numerics, _jit, check_setting, simulate
+from labsim.sph import DropSetting, Numerics, _jit, check_setting, particles, simulate
 
 RADIUS = 5e-4
 MASS = 2540 * 4 / 3 * math.pi * RADIUS**3
@@ -157,7 +157,7 @@ def test_import_to_first_step_is_quick(drop):
         ({"filling_factor": 0.12}, "filling_factor", "(0.12, 0.58)"),
         ({"filling_factor": 0.6}, "filling_factor", "(0.12, 0.58)"),
         ({"crust_excess": 0.5}, "filling_factor", "0.65"),
-        ({"filling_gradient": -20.0}, "filling_factor", "lies outside"),
+        ({"filling_gradient": -25.0}, "filling_gradient", "no strength 1 mm down"),
         ({"material": Material(p_m=0.0)}, "material.p_m", "positive"),
         ({"projectile": CYLINDER}, "projectile.tip", "planar"),
         ({"projectile": Projectile("sphere", RADIUS, 0.0)}, "projectile", "positive"),
@@ -227,3 +227,15 @@ def test_a_filling_factor_that_grows_with_depth(drop):
     run = simulate(a_drop(filling_gradient=10.0))
     assert run.penetration_depth < drop.penetration_depth
     assert np.ptp(run.particles.initial_filling_factor) > 0.01
+
+
+def test_a_filling_factor_that_falls_stays_as_it_is_near_where_strength_ends(drop):
+    setting = a_drop(filling_gradient=-12.0)
+    run = simulate(setting)
+    assert run.penetration_depth > drop.penetration_depth
+    phi, depth = run.particles.initial_filling_factor, np.linspace(0.0, 4e-3, 4001)
+    assert phi.min() == pytest.approx(setting.material.phi_1 + 0.005)
+    above = particles._filling_above(setting, depth)
+    assert np.gradient(above, depth) == pytest.approx(
+        particles.initial_filling_factor(setting, depth), abs=1e-5
+    )
