@@ -32,6 +32,11 @@ NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
 STRENGTH = 0.15  # of ln p_m by which the zones of two codes differ, most under shallow drops
 CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
+# of φ - φ0 where it is small against its largest: how far the compaction reaches. Two codes approach each other from both sides
+# as they are refined, and differ by 15 to 35 % there under deep beads (docs/numerics.md)
+REACH = 0.2
+# of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
+CHANGE = 0.15
 
 
 @dataclass(frozen=True)
@@ -136,6 +141,10 @@ def linearise_scan(
         return np.concatenate([code[1:] * inst.ct_scale, [math.exp(code[0])]])
 
     here = predict(log_p_m, log_speed, amplitudes, instrument)
+    changed = np.zeros(here.size - 1)  # of the compaction, not of the dust that it began with
+    if amplitudes:
+        plain = predict(log_p_m, log_speed, {}, instrument)[:-1] - observed.undisturbed
+        changed = here[:-1] - observed.beside - plain
     data = np.concatenate([observed.filling_factor, [found.tip_depth]])
     n = data.size - 1
     rows, columns = np.nonzero(observed.cells)
@@ -155,12 +164,15 @@ def linearise_scan(
     covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
     speed = observed.scan.speed
     spread = speed.sigma / speed.value
+    reach = REACH * contrast * (1.0 - np.minimum(contrast / max(float(np.max(contrast)), 1e-12), 1.0))
     by_strength = (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02
     nuisances = [
         (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here) / 0.02 * spread,
         by_strength * math.hypot(scatter, STRENGTH),
         np.append(here[:n] * GREY, 0.0),
         np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
+        np.append(reach, 0.0),
+        np.append(changed * CHANGE, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
     pull = (log_speed - model.stated) / spread
