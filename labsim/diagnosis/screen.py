@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from ..inference.fitting import Fit, with_probes
 from ..inference.workbench import Workbench, amplitude_nodes, screening_node
@@ -60,10 +59,8 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     linear = with_probes(bench, fit, names)
     whitened = np.concatenate(
         [
-            solve_triangular(
-                np.linalg.cholesky(block.covariance),
-                np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1),
-                lower=True,
+            block.whiten(
+                np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1)
             )
             for block in linear.blocks
         ]

@@ -15,6 +15,8 @@ from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
 from ..sph import DropRun, DropSetting
 from .curves import encode_run
+from .drop_model import DropModel, make_drop_model
+from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import (
     COARSE_CELLS,
@@ -26,11 +28,6 @@ from .grid import (
     RunGrid,
     few_positions,
     speed_nodes,
-)
-from .likelihood import (
-    DropModel,
-    Terms,
-    make_drop_model,
 )
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore

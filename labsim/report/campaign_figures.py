@@ -25,26 +25,31 @@ COLOURS = (ORANGE, BLUE)  # nominal, extended
 PHI: dict[str, Any] = {"vmin": 0.13, "vmax": 0.28, "cmap": "viridis"}
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
+PANEL = (2.9, 3.1)  # inches a drop, across and down
+LEFT, RIGHT, BELOW, ABOVE = 0.62, 0.12, 0.5, 0.25  # inches, margins of the picture of all drops
+
 
 def draw_drops(views: Sequence[DropView], path: Path) -> Path:
     """Depth against time of every drop with each fit, and below it what is left, in µm, with its band."""
     columns = min(4, len(views))
     lines = math.ceil(len(views) / columns)
+    width, height = max(PANEL[0] * columns, 5.0), PANEL[1] * lines
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            2 * lines,
+        figure = plt.figure(figsize=(width, height))
+        # fixed margins: to lay sixty panels out by the size of their labels takes longer than to draw them
+        grid = figure.add_gridspec(
+            lines,
             columns,
-            figsize=(max(2.9 * columns, 5.0), 3.1 * lines),
-            height_ratios=[2, 1] * lines,
-            layout="constrained",
-            squeeze=False,
+            left=LEFT / width,
+            right=1 - RIGHT / width,
+            bottom=BELOW / height,
+            top=1 - ABOVE / height,
+            wspace=0.22,
+            hspace=0.28,
         )
-        for ax in axes.flat:
-            ax.set_visible(False)
         for k, view in enumerate(views):
-            above, below = axes[2 * (k // columns), k % columns], axes[2 * (k // columns) + 1, k % columns]
-            above.set_visible(True)
-            below.set_visible(True)
+            cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
+            above, below = cell.subplots()
             clock = view.clock * 1e3
             above.plot(clock, view.measured * 1e3, ".", color=INK, ms=4, label="measured")
             below.axhline(0.0, color=INK, lw=0.6)
@@ -63,7 +68,8 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
                 above.set_ylabel("depth (mm)", fontsize=8)
                 below.set_ylabel("left (µm)", fontsize=8)
             below.set_xlabel("time since contact (ms)", fontsize=8)
-        axes[0, 0].legend(fontsize=7)
+            if k == 0:
+                above.legend(fontsize=7)
         figure.savefig(path)
         plt.close(figure)
     return path
