@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..inference.fitting import Fit, with_probes
-from ..inference.workbench import Workbench, amplitude_nodes, screening_node
+from ..inference.nodes import amplitude_nodes, screening_node
+from ..inference.workbench import Workbench
 from ..records import FloatArray
 
 DRAWS = 20_000
@@ -52,7 +53,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
         (name, amplitude, index)
         for name in names
         if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench, name, 0.0)
+        for amplitude in amplitude_nodes(bench.effects[name], 0.0)
     ]
     bench.require_changes(wanted, "fingerprints", coarse=True)
     names = [name for name in names if not bench.costs_runs(name) or _has_runs(bench, name)]

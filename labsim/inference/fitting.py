@@ -20,16 +20,10 @@ from .blocks import Block
 from .drop_model import DropModel
 from .drop_terms import Probe
 from .likelihood import Linearised, linearise, solve_globals, update_nuisances
+from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, screening_node
 from .scans import linearise_scan, update_speed
 from .undisturbed import Seen, linearise_undisturbed
-from .workbench import (
-    Workbench,
-    amplitude_nodes,
-    enclosing_nodes,
-    find_family,
-    nearest_nodes,
-    screening_node,
-)
+from .workbench import Workbench, find_family
 
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
@@ -236,7 +230,7 @@ def _ask(
         (name, amplitude, index)
         for name in hypothesis
         if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench, name, values[name], coarse=coarse, around=around)
+        for amplitude in amplitude_nodes(bench.effects[name], values[name], coarse=coarse, around=around)
         for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, around=around))
     ]
     if wanted:

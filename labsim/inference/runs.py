@@ -152,7 +152,7 @@ class RunStore:
                         continue
                     except OSError as trouble:
                         raise self._refused(trouble) from None
-                    if (stored := self.find(setting)) is not None:  # finished elsewhere since we looked
+                    if (stored := self._read(key, setting)) is not None:  # finished elsewhere since we looked
                         lock.release()
                         self.reused += 1
                         yield key, stored

@@ -11,6 +11,8 @@ import corner
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle
 
 from ..diagnosis.campaign import Diagnosis
@@ -26,7 +28,7 @@ PHI: dict[str, Any] = {"vmin": 0.13, "vmax": 0.28, "cmap": "viridis"}
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
 PANEL = (2.9, 3.1)  # inches a drop, across and down
-LEFT, RIGHT, BELOW, ABOVE = 0.62, 0.12, 0.5, 0.25  # inches, margins of the picture of all drops
+LEFT, BELOW, ABOVE = 0.62, 0.5, 0.25  # inches, margins of pictures of many panels
 
 
 def draw_drops(views: Sequence[DropView], path: Path) -> Path:
@@ -36,17 +38,7 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
     width, height = max(PANEL[0] * columns, 5.0), PANEL[1] * lines
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(width, height))
-        # fixed margins: to lay sixty panels out by the size of their labels takes longer than to draw them
-        grid = figure.add_gridspec(
-            lines,
-            columns,
-            left=LEFT / width,
-            right=1 - RIGHT / width,
-            bottom=BELOW / height,
-            top=1 - ABOVE / height,
-            wspace=0.22,
-            hspace=0.28,
-        )
+        grid = _divide(figure, lines, columns, right=0.12, wspace=0.22, hspace=0.28)
         for k, view in enumerate(views):
             cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
             above, below = cell.subplots()
@@ -73,6 +65,24 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
         figure.savefig(path)
         plt.close(figure)
     return path
+
+
+def _divide(
+    figure: Figure, lines: int, columns: int, *, right: float, wspace: float, hspace: float
+) -> GridSpec:
+    """Panels between fixed margins (inches): to lay dozens of them out by the size of their labels takes longer than to draw
+    them. wspace, hspace : between two, in panels."""
+    width, height = figure.get_size_inches()
+    return figure.add_gridspec(
+        lines,
+        columns,
+        left=LEFT / width,
+        right=1 - right / width,
+        bottom=BELOW / height,
+        top=1 - ABOVE / height,
+        wspace=wspace,
+        hspace=hspace,
+    )
 
 
 def draw_misfit(views: Sequence[DropView], path: Path) -> Path:
@@ -124,9 +134,9 @@ def draw_maps(views: Sequence[MapView], path: Path) -> Path:
         ] or [[measured]]
     columns = max(map(len, rows))
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            len(rows), columns, figsize=(max(3.1 * columns, 4.6), 3.0 * len(rows)), layout="constrained", squeeze=False
-        )  # fmt: skip
+        width, height = max(3.1 * columns, 4.6), 3.0 * len(rows)
+        figure = plt.figure(figsize=(width, height))
+        axes = _divide(figure, len(rows), columns, right=0.6, wspace=0.3, hspace=0.28).subplots(squeeze=False)
         for ax in axes.flat:
             ax.set_visible(False)
         for line, shown in zip(axes, rows, strict=True):
@@ -146,7 +156,7 @@ def _draw_map(ax: Axes, view: MapView, values: FloatArray, colours: dict[str, An
     r = np.concatenate([-found.r[::-1], found.r]) * 1e3
     both = np.concatenate([values[:, ::-1], values], axis=1)
     picture = ax.pcolormesh(r, found.z * 1e3, both, **colours)
-    plt.colorbar(picture, ax=ax, shrink=0.8)
+    plt.colorbar(picture, ax=ax, shrink=0.95)
     radius = found.bead_radius * 1e3
     ax.add_patch(Circle((0, radius - found.tip_depth * 1e3), radius, fill=False, ec=INK, lw=0.8))
     ax.axhline(0.0, color=INK, lw=0.6)

@@ -10,10 +10,10 @@ from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.likelihood import solve_globals
+from labsim.inference.nodes import enclosing_nodes
 from labsim.inference.observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
 from labsim.inference.posterior import measure_residual, sample
 from labsim.inference.scans import Block
-from labsim.inference.workbench import enclosing_nodes
 from labsim.records import Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
 
