@@ -38,9 +38,10 @@ from labsim.diagnosis.campaign import CONFUSABLE
 from labsim.diagnosis.screen import Screening, screen
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import Fit, linearise_at
+from labsim.inference.nodes import enclosing_nodes, screening_node
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
-from labsim.inference.workbench import Workbench, enclosing_nodes, screening_node
+from labsim.inference.workbench import Workbench
 from labsim.records import FloatArray
 
 DROPS = "D01,D02,D03,D05,D06,D07"  # one rod

@@ -127,7 +127,10 @@ def diagnose_campaign(
     )
     found = judge_campaign(bench, nominal, seed=seed)
     best = found.best
-    held_nominal, held_best = predict_held_out(bench, nominal), predict_held_out(bench, best)
+    held_nominal, posterior = _predict(bench, nominal, seed, progress)
+    held_best, extended = (
+        (held_nominal, posterior) if best is nominal else _predict(bench, best, seed, progress)
+    )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
     low, high = campaign.p_m_range
@@ -139,14 +142,19 @@ def diagnose_campaign(
         held_out_nominal=held_nominal,
         held_out_extended=held_best,
         gain=measure_gain(held_nominal, held_best),
-        posterior_nominal=sample_fit(bench, nominal, seed=seed, progress=progress),
-        posterior_extended=sample_fit(bench, best, seed=seed, progress=progress),
+        posterior_nominal=posterior,
+        posterior_extended=extended,
         scatter=estimate_scatter(bench, nominal),
         runs_new=store.new,
         runs_reused=store.reused,
         wall=time.perf_counter() - began,
         warnings=tuple(warnings),
     )
+
+
+def _predict(bench: Workbench, fit: Fit, seed: int, progress: Progress | None) -> tuple[HeldOut, Posterior]:
+    """What follows from a fit: of held-out drops, of its parameters."""
+    return predict_held_out(bench, fit), sample_fit(bench, fit, seed=seed, progress=progress)
 
 
 def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> list[Fit]:

@@ -11,10 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from ..inference.fitting import Fit, with_probes
-from ..inference.workbench import Workbench, amplitude_nodes, screening_node
+from ..inference.nodes import amplitude_nodes, screening_node
+from ..inference.workbench import Workbench
 from ..records import FloatArray
 
 DRAWS = 20_000
@@ -53,17 +53,15 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
         (name, amplitude, index)
         for name in names
         if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench, name, 0.0)
+        for amplitude in amplitude_nodes(bench.effects[name], 0.0)
     ]
     bench.require_changes(wanted, "fingerprints", coarse=True)
     names = [name for name in names if not bench.costs_runs(name) or _has_runs(bench, name)]
     linear = with_probes(bench, fit, names)
     whitened = np.concatenate(
         [
-            solve_triangular(
-                np.linalg.cholesky(block.covariance),
-                np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1),
-                lower=True,
+            block.whiten(
+                np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1)
             )
             for block in linear.blocks
         ]

@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from ..effects import Effect, Parameter
 from ..inference.fitting import Fit, linearise_dust
-from ..inference.likelihood import chi_square, solve_globals
+from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from .screen import Screening
 
@@ -73,7 +73,7 @@ def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
         return chi - 2 * float(parameter.log_prior(math.exp(log_shape)))
 
     block = linearise_dust(bench, {}, {})[0]
-    plain = chi_square(block)
+    plain = block.chi_square
     low, high = (math.log(max(limit, 1e-12)) for limit in parameter.limits)
     grid = np.linspace(low, high, 25)[1:-1]
     values = [cost(x) for x in grid]

@@ -15,8 +15,8 @@ from ..effects import Parameter, list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray
+from .drop_terms import Terms
 from .fitting import Fit, fit_hypothesis, goodness_of_fit, linearise_at
-from .likelihood import Terms
 from .measure import Measurements, measure
 from .posterior import Posterior, QuadraticResidual, measure_residual, sample
 from .runs import Progress, RunStore
@@ -194,15 +194,14 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
     names = ("p_m_Pa", *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)))
     centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
     sigma = np.sqrt(np.diag(fit.covariance))
-    lowers = [np.linalg.cholesky(block.covariance) for block in fit.linear.blocks]
 
     def residual(theta: FloatArray) -> FloatArray:
         values = dict(zip(fit.hypothesis, theta[1:], strict=True))
         linear = linearise_at(bench, fit.models, fit.scan_speeds, float(theta[0]), values)
         return np.concatenate(
             [
-                solve_triangular(lower, block.residual, lower=True)
-                for lower, block in zip(lowers, linear.blocks, strict=True)
+                fitted.whiten(block.residual)
+                for fitted, block in zip(fit.linear.blocks, linear.blocks, strict=True)
             ]
         )
 

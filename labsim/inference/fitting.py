@@ -6,7 +6,6 @@ amplitude nodes that enclose the current estimate, so that the answer never rest
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,27 +14,16 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import chi2
 
-from ..effects import Instrument, Parameter
+from ..effects import Parameter
 from ..records import FloatArray
 from .blocks import Block
-from .likelihood import (
-    DropModel,
-    Linearised,
-    chi_square,
-    linearise,
-    solve_globals,
-    update_nuisances,
-)
+from .drop_model import DropModel
+from .drop_terms import Probe
+from .likelihood import Linearised, linearise, solve_globals, update_nuisances
+from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, screening_node
 from .scans import linearise_scan, update_speed
 from .undisturbed import Seen, linearise_undisturbed
-from .workbench import (
-    Workbench,
-    amplitude_nodes,
-    enclosing_nodes,
-    find_family,
-    nearest_nodes,
-    screening_node,
-)
+from .workbench import Workbench, find_family
 
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
@@ -80,10 +68,12 @@ def fit_hypothesis(
     coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
     """
-    models = copy.deepcopy(nuisances.models if nuisances is not None else bench.models)
+    # nuisances are the fit's own, tables those of the workbench
+    models = [
+        replace(model, table=bench.tables[_table_number(bench, model)])
+        for model in (nuisances.models if nuisances is not None else bench.models)
+    ]
     speeds = list(nuisances.scan_speeds if nuisances is not None else (scan.stated for scan in bench.scans))
-    for model in models:  # tables are shared, only nuisances are the fit's own
-        model.table = bench.tables[_table_number(bench, model)]
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
     names = ("ln_p_m", *hypothesis)
@@ -110,7 +100,7 @@ def fit_hypothesis(
     _ask(bench, hypothesis, log_p_m, values, coarse=coarse, around=around)
     linear = linearise_at(bench, models, speeds, log_p_m, values)
     step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
-    solved_here = sum(chi_square(block) for block in linear.blocks)
+    solved_here = sum(block.chi_square for block in linear.blocks)
     n = sum(block.residual.size for block in linear.blocks)
     log_likelihood = -0.5 * (solved_here + logdet + n * math.log(2 * math.pi))
     evidence = (
@@ -153,7 +143,7 @@ def goodness_of_fit(fit: Fit) -> float:
     worst = []
     for k, block in enumerate(fit.linear.blocks):
         free = 1 + len(fit.hypothesis) + 2 * len(fit.models) if k == 0 else 0
-        worst.append(float(chi2.sf(chi_square(block), max(block.residual.size - free, 1))))
+        worst.append(float(chi2.sf(block.chi_square, max(block.residual.size - free, 1))))
     return min(1.0, len(worst) * min(worst))
 
 
@@ -182,51 +172,48 @@ def linearise_at(
         low, high = parameter.limits
         if not low <= parameter.null + amplitude + step <= high:
             step = -step
-        moved = {**values, name: amplitude + step}
-        probes[name] = (moved, bench.instruments(moved), bench.log_offsets(moved), step)
-    instruments, offsets = bench.instruments(values), bench.log_offsets(values)
-    linear = linearise(models, log_p_m, values, instruments, offsets, bench.terms, probes)
-    blocks = []
-    for scan, speed in zip(bench.scans, scan_speeds, strict=True):
-        name = scan.observed.name
-        seen = {probe: (amps, insts[name], step) for probe, (amps, insts, _offsets, step) in probes.items()}
-        blocks.append(
-            linearise_scan(scan, speed, log_p_m, values, instruments[name], bench.terms.scatter, seen)
-        )
-    return replace(linear, scans=tuple(blocks), undisturbed=tuple(_linearise_dust(bench, values, probes)))
+        probes[name] = _stand(bench, {**values, name: amplitude + step}, step)
+    nominal = _stand(bench, values)
+    linear = linearise(models, log_p_m, nominal, bench.terms, probes)
+    scans = tuple(
+        linearise_scan(scan, speed, log_p_m, nominal, bench.terms.scatter, probes)
+        for scan, speed in zip(bench.scans, scan_speeds, strict=True)
+    )
+    return replace(linear, scans=scans, undisturbed=tuple(_linearise_dust(bench, nominal, probes)))
 
 
-Probes = Mapping[str, tuple[Mapping[str, float], Mapping[str, Instrument], Mapping[str, float], float]]
+def _stand(bench: Workbench, values: Mapping[str, float], step: float = 0.0) -> Probe:
+    return Probe(values, bench.instruments(values), bench.log_offsets(values), step)
 
 
 def linearise_dust(bench: Workbench, values: Mapping[str, float], steps: Mapping[str, float]) -> list[Block]:
     """The undisturbed dust about amplitudes, with tangents by the given steps; empty without scans."""
-    probes = {}
-    for name, step in steps.items():
-        moved = {**values, name: values.get(name, 0.0) + step}
-        probes[name] = (moved, bench.instruments(moved), {}, step)
-    return _linearise_dust(bench, values, probes)
+    probes = {
+        name: _stand(bench, {**values, name: values.get(name, 0.0) + step}, step)
+        for name, step in steps.items()
+    }
+    return _linearise_dust(bench, _stand(bench, values), probes)
 
 
-def _linearise_dust(bench: Workbench, values: Mapping[str, float], probes: Probes) -> list[Block]:
+def _linearise_dust(bench: Workbench, nominal: Probe, probes: Mapping[str, Probe]) -> list[Block]:
     if not bench.undisturbed:
         return []
     plain = bench.grid.setting(bench.families[0], bench.families[0].speeds[0], 1000.0)
 
-    def see(amplitudes: Mapping[str, float], instruments: Mapping[str, Instrument]) -> dict[str, Seen]:
+    def see(point: Probe) -> dict[str, Seen]:
         seen = {}
         for dust in bench.undisturbed:
             setting = plain
-            for name, amplitude in amplitudes.items():
+            for name, amplitude in point.amplitudes.items():
                 if amplitude != 0.0:
                     place = bench.places[dust.name]
                     setting = bench.effects[name].apply(setting, bench.at(name, amplitude), place)
-            seen[dust.name] = (setting, instruments[dust.name])
+            seen[dust.name] = (setting, point.instruments[dust.name])
         return seen
 
-    moved = {name: (see(amps, insts), step) for name, (amps, insts, _offsets, step) in probes.items()}
+    moved = {name: (see(point), point.step) for name, point in probes.items()}
     sigma = bench.campaign.sample.filling_factor_sigma
-    return [linearise_undisturbed(bench.undisturbed, see(values, bench.instruments(values)), moved, sigma)]
+    return [linearise_undisturbed(bench.undisturbed, see(nominal), moved, sigma)]
 
 
 def _ask(
@@ -243,7 +230,7 @@ def _ask(
         (name, amplitude, index)
         for name in hypothesis
         if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench, name, values[name], coarse=coarse, around=around)
+        for amplitude in amplitude_nodes(bench.effects[name], values[name], coarse=coarse, around=around)
         for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, around=around))
     ]
     if wanted:

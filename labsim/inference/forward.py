@@ -7,7 +7,7 @@ difference its own runs made, a polynomial in its amplitude that vanishes at nul
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,44 +37,63 @@ class ResponseTable:
 
     def code(self, log_p_m: float, log_speed: float, amplitudes: Mapping[str, float]) -> FloatArray:
         """Interpolated code (m,)."""
-        across = interpolation_weights(self.log_speeds, log_speed)
-        nearest = sorted(self.base, key=lambda index: abs(math.log(strength_node(index)) - log_p_m))[:4]
-        if not nearest:
+        return self.at(log_p_m, log_speed).code(amplitudes)
+
+    def at(self, log_p_m: float, log_speed: float) -> Response:
+        """What the runs say at one strength and speed. Raises ExtrapolationError where no run says anything."""
+        if not self.base:
             raise ExtrapolationError(
                 "simulation", "runs", "every run of one projectile failed; see labsim runs"
             )
-        nodes = np.array([math.log(strength_node(index)) for index in nearest])
-        code = sum(
-            weight * (across @ self.base[index])
-            for index, weight in zip(nearest, interpolation_weights(nodes, log_p_m), strict=True)
-        )
-        for name, amplitude in amplitudes.items():
-            if amplitude != 0.0 and (name in self.changes or name in self.fingerprints):
-                code = code + self.change(name, log_p_m, amplitude, log_speed)
-        return np.asarray(code)
+        across = interpolation_weights(self.log_speeds, log_speed)
+        nearest, nodes = _nearest(self.base, log_p_m, 4)
+        weights = interpolation_weights(nodes, log_p_m)
+        plain = sum(weight * (across @ self.base[k]) for k, weight in zip(nearest, weights, strict=True))
+        return Response(self, log_p_m, log_speed, across, np.asarray(plain))
 
-    def change(self, name: str, log_p_m: float, amplitude: float, log_speed: float) -> FloatArray:
+
+@dataclass(frozen=True)
+class Response:
+    """A table at one strength and speed. across : (speeds,) weights of its speeds; plain : (m,) code without any effect."""
+
+    table: ResponseTable
+    log_p_m: float
+    log_speed: float
+    across: FloatArray
+    plain: FloatArray
+
+    def code(self, amplitudes: Mapping[str, float]) -> FloatArray:
+        """The code (m,) with effects; that of ``plain`` itself where none of them has runs in the table."""
+        code = self.plain
+        for name, amplitude in amplitudes.items():
+            if amplitude != 0.0 and (name in self.table.changes or name in self.table.fingerprints):
+                code = code + self.change(name, amplitude)
+        return code
+
+    def change(self, name: str, amplitude: float) -> FloatArray:
         """What an effect adds to the code, (m,)."""
-        if name in self.changes:
-            table, across = self.changes[name], interpolation_weights(self.log_speeds, log_speed)
+        if name in self.table.changes:
+            runs, across = self.table.changes[name], self.across
         else:
-            few = self.log_speeds[list(self.few)]
-            table, across = self.fingerprints[name], interpolation_weights(few, log_speed)
-        nearest = sorted(
-            (index for index in table if table[index]),
-            key=lambda index: abs(math.log(strength_node(index)) - log_p_m),
-        )[:3]
-        nodes = np.array([math.log(strength_node(index)) for index in nearest])
+            few = self.table.log_speeds[list(self.table.few)]
+            runs, across = self.table.fingerprints[name], interpolation_weights(few, self.log_speed)
+        nearest, nodes = _nearest([index for index in runs if runs[index]], self.log_p_m, 3)
         margin = 0.5 * math.log(STRENGTH_RATIO)
-        inside = float(np.clip(log_p_m, nodes.min() - margin, nodes.max() + margin))
-        change = np.zeros(0)
+        inside = min(max(self.log_p_m, nodes.min() - margin), nodes.max() + margin)
+        change = 0.0
         for index, weight in zip(nearest, interpolation_weights(nodes, inside), strict=True):
-            known = sorted(table[index], key=lambda a: abs(a - amplitude))[:3]
-            at = np.array([0.0, *known])
-            shares = interpolation_weights(at, amplitude)[1:]
-            part = sum(share * (across @ table[index][a]) for a, share in zip(known, shares, strict=True))
-            change = weight * part + (change if change.size else 0.0)
+            known = sorted(runs[index], key=lambda a: abs(a - amplitude))[:3]
+            shares = interpolation_weights(np.array([0.0, *known]), amplitude)[1:]
+            part = sum(share * (across @ runs[index][a]) for a, share in zip(known, shares, strict=True))
+            change = weight * part + change
         return np.asarray(change)
+
+
+def _nearest(indices: Iterable[int], log_p_m: float, count: int) -> tuple[list[int], FloatArray]:
+    """The strength indices nearest to a value, nearest first, and ln of their p_m."""
+    nodes = {index: math.log(strength_node(index)) for index in indices}
+    nearest = sorted(nodes, key=lambda index: abs(nodes[index] - log_p_m))[:count]
+    return nearest, np.array([nodes[index] for index in nearest])
 
 
 @dataclass(frozen=True)

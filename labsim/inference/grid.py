@@ -81,11 +81,9 @@ def strength_node(index: int) -> float:
 
 def interpolation_weights(nodes: FloatArray, at: float) -> FloatArray:
     """Lagrange weights (k,) of the polynomial through all nodes."""
-    weights = np.ones(len(nodes))
-    for k, node in enumerate(nodes):
-        others = np.delete(nodes, k)
-        weights[k] = np.prod((at - others) / (node - others))
-    return weights
+    own = np.eye(len(nodes), dtype=bool)
+    apart = np.where(own, 1.0, np.subtract.outer(nodes, nodes))
+    return np.asarray(np.where(own, 1.0, (at - nodes) / apart).prod(axis=1))
 
 
 def set_nominal_drop(

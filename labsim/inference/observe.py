@@ -84,23 +84,23 @@ def deviate_robustly(time: FloatArray, row: FloatArray, sigma: float) -> FloatAr
     Reweighted least squares, first with the weights of absolute deviations, then Tukey's: outliers side by side would hide
     one another from a plain fit, and get their neighbours thrown out.
     """
-    n = row.size
-    deviation = np.zeros(n)
-    for i in range(n):
-        near = np.array([k for k in range(max(i - WINDOW, 0), min(i + WINDOW + 1, n)) if k != i])
-        x = time[near] - time[i]
-        design = np.vander(x / np.abs(x).max(), 3, increasing=True)
-        weight = np.ones(near.size)
-        for turn in range(12):
-            scaled = design * weight[:, None]
-            best = np.linalg.lstsq(scaled, row[near] * weight, rcond=None)[0]
-            left = np.abs(row[near] - design @ best)
-            if turn < 8:
-                weight = 1 / np.sqrt(np.maximum(left, 0.3 * sigma))
-            else:
-                weight = np.clip(1 - (left / (8 * sigma + 0.2)) ** 2, 1e-3, 1.0)
-        deviation[i] = row[i] - best[0]
-    return deviation
+    places = np.arange(row.size)[:, None] + np.delete(np.arange(-WINDOW, WINDOW + 1), WINDOW)
+    real = (places >= 0) & (places < row.size)  # the first and the last have fewer neighbours
+    near = np.clip(places, 0, row.size - 1)
+    x = np.where(real, time[near] - time[:, None], 0.0)
+    x /= np.abs(x).max(axis=1, keepdims=True)
+    design = np.stack([np.ones_like(x), x, x**2], axis=2)  # (n, neighbours, 3), all parabolas at once
+    weight = real.astype(float)
+    best = np.zeros((row.size, 3))
+    for turn in range(12):
+        inverse = np.linalg.pinv(design * weight[:, :, None])
+        best = np.einsum("nkj,nj->nk", inverse, row[near] * weight)
+        left = np.abs(row[near] - np.einsum("njk,nk->nj", design, best))
+        if turn < 8:
+            weight = real / np.sqrt(np.maximum(left, 0.3 * sigma))
+        else:
+            weight = real * np.clip(1 - (left / (8 * sigma + 0.2)) ** 2, 1e-3, 1.0)
+    return np.asarray(row - best[:, 0])
 
 
 def _fit_free_fall(time: FloatArray, depth: FloatArray) -> tuple[float, float]:

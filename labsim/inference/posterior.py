@@ -9,8 +9,10 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +55,15 @@ class QuadraticResidual:
     scale: FloatArray
     coefficients: FloatArray  # (terms, n)
 
+    @cached_property
+    def gram(self) -> FloatArray:
+        """(terms, terms) products of the coefficients: n is large, terms are few."""
+        return self.coefficients @ self.coefficients.T
+
     def __call__(self, theta: FloatArray) -> FloatArray:
         """(m, d) -> (m,) half the squared length of the residual."""
         terms = _terms((np.atleast_2d(theta) - self.centre) / self.scale)
-        gram = self.coefficients @ self.coefficients.T  # n is large, terms are few
-        return 0.5 * np.einsum("mi,ij,mj->m", terms, gram, terms)
+        return 0.5 * np.sum((terms @ self.gram) * terms, axis=1)
 
 
 def _terms(u: FloatArray) -> FloatArray:
@@ -164,6 +170,17 @@ def sample(
         sample_stats={"lp": np.swapaxes(sampler.get_log_prob(discard=discard), 0, 1)},
     )
     quarters = groups.reshape(4, -1, d) if walkers % 4 == 0 else groups
-    r_hat = max(float(arviz.rhat(quarters[:, :, k])) for k in range(d))
+    with _uncompiled(arviz.Numba):
+        r_hat = max(float(arviz.rhat(quarters[:, :, k])) for k in range(d))
     total = chain.shape[0] * walkers
     return Posterior(tuple(names), data, r_hat, total / tau, int(chain.shape[0]), tau)
+
+
+@contextmanager
+def _uncompiled(numba: Any) -> Iterator[None]:
+    """Within it arviz leaves its functions uncompiled: to compile one takes longer than all it is called for here."""
+    before, numba.numba_flag = numba.numba_flag, False
+    try:
+        yield
+    finally:
+        numba.numba_flag = before

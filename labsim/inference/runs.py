@@ -66,7 +66,9 @@ class RunStore:
 
     def find(self, setting: DropSetting) -> DropRun | FailedRun | None:
         """The stored run of this setting and this solver, or None (also where its file is damaged)."""
-        key = make_key(setting)
+        return self._read(make_key(setting), setting)
+
+    def _read(self, key: str, setting: DropSetting) -> DropRun | FailedRun | None:
         try:
             return read_run(self.path(key), setting, key)
         except DAMAGE:
@@ -113,10 +115,11 @@ class RunStore:
         Raises InferenceError when a worker process dies; what was finished by then is stored.
         """
         report = progress or (lambda done, total, text: None)
-        by_key = {make_key(setting): setting for setting in settings}
+        keys = [make_key(setting) for setting in settings]
+        by_key = dict(zip(keys, settings, strict=True))
         results: dict[str, DropRun | FailedRun] = {}
         for key, setting in by_key.items():
-            if (stored := self.find(setting)) is not None:
+            if (stored := self._read(key, setting)) is not None:
                 results[key] = stored
         self.reused += len(results)
         missing = sorted(set(by_key) - set(results), key=lambda key: -estimate_cost(by_key[key]))
@@ -130,7 +133,7 @@ class RunStore:
                     results[key] = run
                     done += cost[key]
                     report(total if len(results) == len(by_key) else done, total, text)
-        return [results[make_key(setting)] for setting in settings]
+        return [results[key] for key in keys]
 
     def _run_missing(
         self, executor: Executor, slots: int, todo: list[tuple[str, DropSetting]]
@@ -149,7 +152,7 @@ class RunStore:
                         continue
                     except OSError as trouble:
                         raise self._refused(trouble) from None
-                    if (stored := self.find(setting)) is not None:  # finished elsewhere since we looked
+                    if (stored := self._read(key, setting)) is not None:  # finished elsewhere since we looked
                         lock.release()
                         self.reused += 1
                         yield key, stored

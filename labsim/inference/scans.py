@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ..effects import Instrument
 from ..records import FillingMap, FloatArray, Scan
 from ..sph import DropRun
 from .blocks import Block
+from .drop_terms import Probe
 from .forward import ResponseTable
 from .undisturbed import GREY, observe_undisturbed
 
@@ -59,6 +61,27 @@ class ObservedScan:
     @property
     def radius(self) -> float:
         return self.scan.projectile.tip_radius
+
+    @cached_property
+    def noise(self) -> FloatArray:
+        """(n, n) covariance of the map's own noise, correlated between neighbours."""
+        errors = self.reduced.errors
+        near_r, near_z = (np.clip(c, 0.0, 0.95) for c in (errors.correlation_r, errors.correlation_z))
+        apart_r, apart_z = self._apart()
+        return np.asarray(np.outer(self.sigma, self.sigma) * near_r**apart_r * near_z**apart_z)
+
+    @cached_property
+    def likeness(self) -> list[FloatArray]:
+        """(n, n) correlations of each of the solver's errors in NUMERICAL."""
+        apart_r, apart_z = self._apart()
+        cell = float(np.mean(np.diff(self.reduced.map.r)))
+        distance2 = (apart_r**2 + apart_z**2) * (cell / self.radius) ** 2
+        return [np.exp(-0.5 * distance2 / length**2) for _share, length in NUMERICAL]
+
+    def _apart(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, n) distances between the cells, in cells."""
+        rows, columns = np.nonzero(self.cells)
+        return np.abs(np.subtract.outer(columns, columns)), np.abs(np.subtract.outer(rows, rows))
 
 
 def observe_scan(reduced: ReducedScan) -> ObservedScan:
@@ -127,47 +150,42 @@ def linearise_scan(
     model: ScanModel,
     log_speed: float,
     log_p_m: float,
-    amplitudes: Mapping[str, float],
-    instrument: Instrument,
+    nominal: Probe,
     scatter: float,
-    probes: Mapping[str, tuple[Mapping[str, float], Instrument, float]],
+    probes: Mapping[str, Probe],
 ) -> Block:
-    """Residual, covariance and tangents of one scan; probes: name -> (amplitudes, instrument, step)."""
+    """Residual, covariance and tangents of one scan about the point ``nominal``."""
     observed = model.observed
     found = observed.reduced.map
+    amplitudes, instrument = nominal.amplitudes, nominal.instruments[observed.name]
+    response = model.table.at(log_p_m, log_speed)
 
-    def predict(lp: float, ls: float, amps: Mapping[str, float], inst: Instrument) -> FloatArray:
-        code = model.table.code(lp, ls, amps)
+    def see(code: FloatArray, inst: Instrument) -> FloatArray:
         return np.concatenate([code[1:] * inst.ct_scale, [math.exp(code[0])]])
 
-    here = predict(log_p_m, log_speed, amplitudes, instrument)
+    def predict(lp: float, ls: float) -> FloatArray:
+        return see(model.table.code(lp, ls, amplitudes), instrument)
+
+    here = see(response.code(amplitudes), instrument)
     changed = np.zeros(here.size - 1)  # of the compaction, not of the dust that it began with
     if amplitudes:
-        plain = predict(log_p_m, log_speed, {}, instrument)[:-1] - observed.undisturbed
+        plain = see(response.code({}), instrument)[:-1] - observed.undisturbed
         changed = here[:-1] - observed.beside - plain
     data = np.concatenate([observed.filling_factor, [found.tip_depth]])
     n = data.size - 1
-    rows, columns = np.nonzero(observed.cells)
-    errors = observed.reduced.errors
-    near_r = np.clip(errors.correlation_r, 0.0, 0.95)
-    near_z = np.clip(errors.correlation_z, 0.0, 0.95)
-    apart_r, apart_z = np.abs(np.subtract.outer(columns, columns)), np.abs(np.subtract.outer(rows, rows))
-    noise = np.outer(observed.sigma, observed.sigma) * near_r**apart_r * near_z**apart_z
     covariance = np.zeros((n + 1, n + 1))
-    covariance[:n, :n] = noise
-    cell = float(np.mean(np.diff(found.r)))
-    distance2 = (apart_r**2 + apart_z**2) * (cell / observed.radius) ** 2
+    covariance[:n, :n] = observed.noise
     contrast = np.abs(here[:n] - observed.beside)
-    for share, length in NUMERICAL:
+    for (share, _length), alike in zip(NUMERICAL, observed.likeness, strict=True):
         error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
-        covariance[:n, :n] += np.outer(error, error) * np.exp(-0.5 * distance2 / length**2)
+        covariance[:n, :n] += np.outer(error, error) * alike
     covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
     speed = observed.scan.speed
     spread = speed.sigma / speed.value
     reach = REACH * contrast * (1.0 - np.minimum(contrast / max(float(np.max(contrast)), 1e-12), 1.0))
-    by_strength = (predict(log_p_m + 0.02, log_speed, amplitudes, instrument) - here) / 0.02
+    by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
     nuisances = [
-        (predict(log_p_m, log_speed + 0.02, amplitudes, instrument) - here) / 0.02 * spread,
+        (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * spread,
         by_strength * math.hypot(scatter, STRENGTH),
         np.append(here[:n] * GREY, 0.0),
         np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
@@ -176,12 +194,13 @@ def linearise_scan(
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
     pull = (log_speed - model.stated) / spread
-    for column in nuisances:
-        covariance += np.outer(column, column)
+    columns = np.stack(nuisances, axis=1)
+    covariance += columns @ columns.T
     covariance[np.diag_indices(n + 1)] += 1e-12
     tangents = {"ln_p_m": by_strength}
-    for name, (amps, inst, step) in probes.items():
-        tangents[name] = (predict(log_p_m, log_speed, amps, inst) - here) / step
+    for name, point in probes.items():
+        moved = see(response.code(point.amplitudes), point.instruments[observed.name])
+        tangents[name] = (moved - here) / point.step
     residual = data - here + nuisances[0] * pull  # the speed is zero-mean about what is stated
     # what an unknown cause changes is alike in all cells of like contrast
     size = np.append(contrast, 0.0)

@@ -1,4 +1,4 @@
-"""A measured campaign with its runs: everything a fit needs, and where about an estimate runs are made."""
+"""A measured campaign with its runs: everything a fit needs."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
 from ..sph import DropRun, DropSetting
 from .curves import encode_run
+from .drop_model import DropModel, make_drop_model
+from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import (
     COARSE_CELLS,
-    STRENGTH_ANCHOR,
-    STRENGTH_RATIO,
     Change,
     Family,
     Request,
@@ -27,11 +27,7 @@ from .grid import (
     few_positions,
     speed_nodes,
 )
-from .likelihood import (
-    DropModel,
-    Terms,
-    make_drop_model,
-)
+from .nodes import amplitude_nodes, enclosing_nodes, screening_node
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
 from .scans import ObservedScan, ScanModel, encode_scan_run
@@ -176,7 +172,7 @@ class Workbench:
         """The base about a strength and a fingerprint of one effect there."""
         self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range))
         index = screening_node(log_p_m)
-        wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self, name, 0.0)]
+        wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self.effects[name], 0.0)]
         self.require_changes(wanted, f"{name} at another p_m", coarse=True)
 
     def instruments(self, amplitudes: Mapping[str, float]) -> dict[str, Instrument]:
@@ -325,63 +321,3 @@ def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: 
         if same and family.is_scan == is_scan and math.isclose(f.mass, projectile.mass, rel_tol=1e-9):
             return number
     raise InferenceError("simulation", "projectile", "has no runs")
-
-
-def place_strength(log_p_m: float) -> float:
-    """Where a strength lies among the nodes: an integer at a node."""
-    return (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
-
-
-def enclosing_nodes(log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.inf)) -> list[int]:
-    """The four strength nodes about a value; none beyond those that enclose the range (Pa), where soft dust costs most."""
-    below = math.floor(place_strength(log_p_m))
-    low, high = p_m_range
-    if math.isfinite(high):
-        below = min(below, math.ceil(place_strength(math.log(high))) - 2)
-    if low > 0.0:
-        below = max(below, math.floor(place_strength(math.log(low))) + 1)
-    return [below - 1, below, below + 1, below + 2]
-
-
-def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -> list[int]:
-    """The nearest strength node, and the next one where the value lies well between two; ``around``: both neighbours too."""
-    place = place_strength(log_p_m)
-    near = round(place)
-    if around:
-        return [near - 1, near, near + 1]
-    if abs(place - near) <= share:
-        return [near]
-    return [math.floor(place), math.ceil(place)]
-
-
-def screening_node(log_p_m: float) -> int:
-    """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
-    whose nominal p_m an effect has driven off still share their fingerprints' runs."""
-    return 2 * round(0.5 * place_strength(log_p_m))
-
-
-def amplitude_nodes(
-    bench: Workbench, name: str, amplitude: float, *, coarse: bool = False, around: bool = False
-) -> list[float]:
-    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits; ``around``: one
-    more beyond them, so that the curve between two does not depend on the side that the estimate came from."""
-    parameter = bench.effects[name].amplitudes[0]
-    step, (low, high) = parameter.step, parameter.limits
-    place = amplitude / step
-    # of the numerics, much finer runs would cost more than they say
-    if abs(place) <= 1.0 or bench.effects[name].kind == "numerics":
-        wanted = [1.0 if place >= 0 else -1.0]
-    else:
-        ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
-        sign = math.copysign(1.0, place)
-        above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
-        below = [m for m in ladder if m < abs(place)] or [1.0]
-        wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
-    nodes = []
-    for m in wanted:
-        value = float(np.clip(parameter.null + m * step, low, high)) - parameter.null
-        if value == 0.0:  # the limit is the null on that side
-            value = step
-        if value not in nodes:
-            nodes.append(value)
-    return nodes

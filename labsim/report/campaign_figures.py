@@ -11,6 +11,8 @@ import corner
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle
 
 from ..diagnosis.campaign import Diagnosis
@@ -25,26 +27,21 @@ COLOURS = (ORANGE, BLUE)  # nominal, extended
 PHI: dict[str, Any] = {"vmin": 0.13, "vmax": 0.28, "cmap": "viridis"}
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
+PANEL = (2.9, 3.1)  # inches a drop, across and down
+LEFT, BELOW, ABOVE = 0.62, 0.5, 0.25  # inches, margins of pictures of many panels
+
 
 def draw_drops(views: Sequence[DropView], path: Path) -> Path:
     """Depth against time of every drop with each fit, and below it what is left, in µm, with its band."""
     columns = min(4, len(views))
     lines = math.ceil(len(views) / columns)
+    width, height = max(PANEL[0] * columns, 5.0), PANEL[1] * lines
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            2 * lines,
-            columns,
-            figsize=(max(2.9 * columns, 5.0), 3.1 * lines),
-            height_ratios=[2, 1] * lines,
-            layout="constrained",
-            squeeze=False,
-        )
-        for ax in axes.flat:
-            ax.set_visible(False)
+        figure = plt.figure(figsize=(width, height))
+        grid = _divide(figure, lines, columns, right=0.12, wspace=0.22, hspace=0.28)
         for k, view in enumerate(views):
-            above, below = axes[2 * (k // columns), k % columns], axes[2 * (k // columns) + 1, k % columns]
-            above.set_visible(True)
-            below.set_visible(True)
+            cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
+            above, below = np.ravel(cell.subplots())
             clock = view.clock * 1e3
             above.plot(clock, view.measured * 1e3, ".", color=INK, ms=4, label="measured")
             below.axhline(0.0, color=INK, lw=0.6)
@@ -63,10 +60,29 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
                 above.set_ylabel("depth (mm)", fontsize=8)
                 below.set_ylabel("left (µm)", fontsize=8)
             below.set_xlabel("time since contact (ms)", fontsize=8)
-        axes[0, 0].legend(fontsize=7)
+            if k == 0:
+                above.legend(fontsize=7)
         figure.savefig(path)
         plt.close(figure)
     return path
+
+
+def _divide(
+    figure: Figure, lines: int, columns: int, *, right: float, wspace: float, hspace: float
+) -> GridSpec:
+    """Panels between fixed margins (inches): to lay dozens of them out by the size of their labels takes longer than to draw
+    them. wspace, hspace : between two, in panels."""
+    width, height = figure.get_size_inches()
+    return figure.add_gridspec(
+        lines,
+        columns,
+        left=LEFT / width,
+        right=1 - right / width,
+        bottom=BELOW / height,
+        top=1 - ABOVE / height,
+        wspace=wspace,
+        hspace=hspace,
+    )
 
 
 def draw_misfit(views: Sequence[DropView], path: Path) -> Path:
@@ -118,9 +134,9 @@ def draw_maps(views: Sequence[MapView], path: Path) -> Path:
         ] or [[measured]]
     columns = max(map(len, rows))
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            len(rows), columns, figsize=(max(3.1 * columns, 4.6), 3.0 * len(rows)), layout="constrained", squeeze=False
-        )  # fmt: skip
+        width, height = max(3.1 * columns, 4.6), 3.0 * len(rows)
+        figure = plt.figure(figsize=(width, height))
+        axes = _divide(figure, len(rows), columns, right=0.6, wspace=0.3, hspace=0.28).subplots(squeeze=False)
         for ax in axes.flat:
             ax.set_visible(False)
         for line, shown in zip(axes, rows, strict=True):
@@ -140,7 +156,7 @@ def _draw_map(ax: Axes, view: MapView, values: FloatArray, colours: dict[str, An
     r = np.concatenate([-found.r[::-1], found.r]) * 1e3
     both = np.concatenate([values[:, ::-1], values], axis=1)
     picture = ax.pcolormesh(r, found.z * 1e3, both, **colours)
-    plt.colorbar(picture, ax=ax, shrink=0.8)
+    plt.colorbar(picture, ax=ax, shrink=0.95)
     radius = found.bead_radius * 1e3
     ax.add_patch(Circle((0, radius - found.tip_depth * 1e3), radius, fill=False, ec=INK, lw=0.8))
     ax.axhline(0.0, color=INK, lw=0.6)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..inference.drop_model import DropModel
 from ..inference.fitting import Fit
 from ..inference.forward import predict_depth
-from ..inference.likelihood import DropModel
 from ..inference.workbench import Workbench
 from ..records import FloatArray, Projectile
 
@@ -64,6 +64,7 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
     """Every drop that entered the likelihood, in the order of the campaign, with each named fit."""
     views = []
     first = fits[0][1]
+    offsets = {name: contact_offset(bench, fit) for name, fit in fits}
     for model in first.models:
         observed = model.observed
         clock = observed.time - model.instant.contact_time
@@ -71,7 +72,7 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
         simulated = {}
         for name, fit in fits:
             other = next(m for m in fit.models if m.observed.name == observed.name)
-            simulated[name] = predict_drop(bench, fit, other)[seen]
+            simulated[name] = predict_drop(bench, fit, other, offsets[name])[seen]
         views.append(
             DropView(
                 observed.name,
@@ -87,14 +88,14 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
     return views
 
 
-def predict_drop(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
-    """Stated depth (m) at the drop's frames."""
+def predict_drop(bench: Workbench, fit: Fit, model: DropModel, contact: float) -> FloatArray:
+    """Stated depth (m) at the drop's frames; contact : the fit's contact_offset."""
     name = model.observed.name
     instrument = bench.instruments(fit.values)[name]
     log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[name]
     code = model.table.code(log_p_m, model.instant.log_speed, fit.values)
     offset = instrument.row_offset_px * model.observed.pixel
-    offset += contact_offset(bench, fit) * model.radius
+    offset += contact * model.radius
     time = model.observed.time
     return predict_depth(code, time, model.instant, instrument.pixel_factor, instrument.rate_factor, offset)
 
@@ -106,7 +107,7 @@ def contact_offset(bench: Workbench, fit: Fit) -> float:
     for model in fit.models:
         section = linear.sections[model.observed.name]
         column[section.start : section.start + model.matrix.shape[0]] = size * model.radius
-    return size * float(column @ np.linalg.solve(linear.covariance, linear.residual))
+    return size * float(column @ linear.drops.solve(linear.residual))
 
 
 def allow_for_errors(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:

@@ -10,10 +10,10 @@ from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.likelihood import solve_globals
+from labsim.inference.nodes import enclosing_nodes
 from labsim.inference.observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
 from labsim.inference.posterior import measure_residual, sample
 from labsim.inference.scans import Block
-from labsim.inference.workbench import enclosing_nodes
 from labsim.records import Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
 
@@ -90,9 +90,9 @@ def test_what_an_effect_changes_bends_with_strength_through_three_nodes():
 
     table.changes["e"] = {k: {1.0: np.full_like(base, bend(math.log(1000.0 * 2.0**k)))} for k in (-1, 0, 1)}
     for p_m in (550.0, 1000.0, 1370.0):
-        found = table.change("e", math.log(p_m), 1.0, speeds[1])
+        found = table.at(math.log(p_m), speeds[1]).change("e", 1.0)
         assert found == pytest.approx(bend(math.log(p_m)), rel=1e-9)
-    beyond = table.change("e", math.log(8000.0), 1.0, speeds[1])  # held half a node beyond the last
+    beyond = table.at(math.log(8000.0), speeds[1]).change("e", 1.0)  # held half a node beyond the last
     assert beyond == pytest.approx(bend(math.log(2000.0 * math.sqrt(2.0))), rel=1e-9)
 
 

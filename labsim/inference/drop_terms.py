@@ -1,0 +1,174 @@
+"""Everything the likelihood knows of one drop about one point: residual, errors of its own, what it shares with others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..effects import Instrument
+from ..records import FloatArray
+from .drop_model import FREE, SPEED_WIDTH, DropModel
+from .observe import STANDARD_GRAVITY
+
+SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
+# ln of speed over root of gravity and radius, where p_m makes up for all of the solver's error
+USUAL_SWIFTNESS = 1.85
+MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
+LEAST_SCATTER = 1e-9
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Sizes of the error terms; zero switches one off."""
+
+    scatter: float = 0.02  # of ln p_m from sample to sample
+    pixel_scale: float = 0.001  # relative, common to all drops of one camera setting, where nothing is stated
+    frame_scale: float = 0.0002
+    contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
+    numerical: float = 0.004  # of the depth, smooth
+    numerical_change: float = 0.03  # of what an effect changes of the depth, smooth
+    numerical_strength: float = 0.02  # of ln p_m, common to all drops
+    numerical_slope: float = 0.01  # of the depth, per e-fold of speed over √radius, common to all drops
+    heights: bool = True
+
+
+class Probe(NamedTuple):
+    """A neighbouring point. amplitudes : effect -> amplitude; instruments, log_offsets (of ln p_m) : by name of drop or scan;
+    step : by how much one global differs there."""
+
+    amplitudes: Mapping[str, float]
+    instruments: Mapping[str, Instrument]
+    log_offsets: Mapping[str, float]
+    step: float
+
+
+@dataclass(frozen=True)
+class NumericalError:
+    """The solver's error of one drop. size : (n,) m; fraction : (n,) of the time to the stop; drops are alike by froude (ln of
+    speed over √radius), radius and mass (logarithms)."""
+
+    size: FloatArray
+    fraction: FloatArray
+    froude: float
+    radius: float
+    mass: float
+
+
+@dataclass(frozen=True)
+class DropTerms:
+    """One drop about one point. residual, white (variance) : (n,); local : (n, nuisances) scaled by their prior widths;
+    pull : (nuisances,) current nuisances over prior widths; tangents : name -> (n,); shared : name -> (n,), errors with one
+    value for several drops."""
+
+    residual: FloatArray
+    white: FloatArray
+    local: FloatArray
+    pull: FloatArray
+    tangents: dict[str, FloatArray]
+    shared: dict[str, FloatArray]
+    numerical: NumericalError
+
+
+def linearise_drop(
+    model: DropModel, log_p_m: float, nominal: Probe, terms: Terms, probes: Mapping[str, Probe]
+) -> DropTerms:
+    """Residual, errors and tangents of one drop; nominal : the point itself (its step means nothing)."""
+    observed, instant = model.observed, model.instant
+    name, n = observed.name, model.matrix.shape[0]
+    instrument = nominal.instruments[name]
+    lp = log_p_m + nominal.log_offsets.get(name, 0.0)
+    response = model.table.at(lp, instant.log_speed)
+    code = response.code(nominal.amplitudes)
+    here = model.predict(code, instrument, instant)
+    speed = model.predict_speed(code, instrument, instant)
+    faster = replace(instant, log_speed=instant.log_speed + 1e-3)
+    fast_code = model.table.code(lp, faster.log_speed, nominal.amplitudes)
+    by_speed = (model.predict(fast_code, instrument, faster) - here) / 1e-3
+    strong_code = model.table.code(lp + 1e-2, instant.log_speed, nominal.amplitudes)
+    by_strength = (model.predict(strong_code, instrument, instant) - here) / 1e-2
+
+    tangents = {"ln_p_m": by_strength}
+    for probe, point in probes.items():
+        there = log_p_m + point.log_offsets.get(name, 0.0)
+        at = response if there == lp else model.table.at(there, instant.log_speed)
+        moved = at.code(point.amplitudes)
+        if np.array_equal(moved, code) and point.instruments[name] == instrument:
+            tangents[probe] = np.zeros(n)
+        else:
+            tangents[probe] = (model.predict(moved, point.instruments[name], instant) - here) / point.step
+
+    mass = observed.drop.projectile
+    scatter = math.hypot(terms.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
+    widths = np.array([FREE, SPEED_WIDTH, model.surface_sigma, max(scatter, LEAST_SCATTER)])
+    local = np.stack([-speed, by_speed, np.ones(n), by_strength], axis=1) * widths
+    pull = np.array([0.0, 0.0, instant.surface / model.surface_sigma, 0.0])
+
+    def differ(changed: Instrument) -> FloatArray:
+        return (model.predict(code, changed, instant) - here) / 1e-3
+
+    camera = f"{observed.pixel:.6g} {model.camera.frame_rate:.6g}"
+    # two codes part slowly from slow to fast drops: the one is too deep at one end, too shallow at the other
+    swift = instant.log_speed - 0.5 * math.log(STANDARD_GRAVITY * model.radius) - USUAL_SWIFTNESS
+    larger = instrument.replace(pixel_factor=instrument.pixel_factor * 1.001)
+    quicker = instrument.replace(rate_factor=instrument.rate_factor * 1.001)
+    shared = {
+        f"pixel {camera}": differ(larger) * terms.pixel_scale,
+        f"frame {camera}": differ(quicker) * terms.frame_scale,
+        "contact offset": np.full(n, terms.contact_offset * model.radius),
+        "numerical slope": np.maximum(here, 0.0) * swift * terms.numerical_slope,
+        "numerical strength": by_strength * terms.numerical_strength,
+    }
+
+    clock = model.matrix @ (observed.time / instrument.rate_factor - instant.contact_time)
+    final, stop = np.exp(code[0]), np.exp(code[1])
+    reached = np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0)
+    plain = here if code is response.plain else model.predict(response.plain, instrument, instant)
+    numerical = NumericalError(
+        np.hypot(reached * terms.numerical, (here - plain) * terms.numerical_change),
+        np.clip(clock / stop, 0.0, 1.0),
+        instant.log_speed - 0.5 * math.log(model.radius),
+        math.log(model.radius),
+        math.log(mass.mass / model.radius**3),
+    )
+    drop = DropTerms(
+        model.matrix @ observed.depth - here,
+        observed.sigma**2 * np.sum(model.matrix**2, axis=1),
+        local,
+        pull,
+        tangents,
+        shared,
+        numerical,
+    )
+    if terms.heights:
+        drop = _add_height(drop, model)
+    # nuisances are zero-mean about their priors, not about here
+    return replace(drop, residual=drop.residual + drop.local @ pull)
+
+
+def _add_height(drop: DropTerms, model: DropModel) -> DropTerms:
+    """The stated height is one more datum: ln v."""
+    height = model.observed.drop.height
+    if height is None or height.value <= 0:
+        return drop
+    expected = 0.5 * math.log(2 * STANDARD_GRAVITY * height.value)
+    sigma = math.hypot(0.5 * height.sigma / height.value, SPEED_SLACK)
+    # the logarithm of a height known to some ten percent is not normal; its mean is lower
+    expected -= 0.25 * (height.sigma / height.value) ** 2
+
+    def pad(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        return {name: np.append(column, 0.0) for name, column in values.items()}
+
+    numerical = drop.numerical
+    return DropTerms(
+        np.append(drop.residual, expected - model.instant.log_speed),
+        np.append(drop.white, sigma**2),
+        np.vstack([drop.local, [0.0, SPEED_WIDTH, 0.0, 0.0]]),
+        drop.pull,
+        pad(drop.tangents),
+        pad(drop.shared),
+        replace(numerical, size=np.append(numerical.size, 0.0), fraction=np.append(numerical.fraction, 0.0)),
+    )

@@ -1,0 +1,70 @@
+"""Where about an estimate runs are made: nodes of p_m on the fixed grid, and of an effect's amplitude."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..effects import Effect
+from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
+
+
+def place_strength(log_p_m: float) -> float:
+    """Where a strength lies among the nodes: an integer at a node."""
+    return (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
+
+
+def enclosing_nodes(log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.inf)) -> list[int]:
+    """The four strength nodes about a value; none beyond those that enclose the range (Pa), where soft dust costs most."""
+    below = math.floor(place_strength(log_p_m))
+    low, high = p_m_range
+    if math.isfinite(high):
+        below = min(below, math.ceil(place_strength(math.log(high))) - 2)
+    if low > 0.0:
+        below = max(below, math.floor(place_strength(math.log(low))) + 1)
+    return [below - 1, below, below + 1, below + 2]
+
+
+def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -> list[int]:
+    """The nearest strength node, and the next one where the value lies well between two; ``around``: both neighbours too."""
+    place = place_strength(log_p_m)
+    near = round(place)
+    if around:
+        return [near - 1, near, near + 1]
+    if abs(place - near) <= share:
+        return [near]
+    return [math.floor(place), math.ceil(place)]
+
+
+def screening_node(log_p_m: float) -> int:
+    """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
+    whose nominal p_m an effect has driven off still share their fingerprints' runs."""
+    return 2 * round(0.5 * place_strength(log_p_m))
+
+
+def amplitude_nodes(
+    effect: Effect, amplitude: float, *, coarse: bool = False, around: bool = False
+) -> list[float]:
+    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits; ``around``: one
+    more beyond them, so that the curve between two does not depend on the side that the estimate came from."""
+    parameter = effect.amplitudes[0]
+    step, (low, high) = parameter.step, parameter.limits
+    place = amplitude / step
+    # of the numerics, much finer runs would cost more than they say
+    if abs(place) <= 1.0 or effect.kind == "numerics":
+        wanted = [1.0 if place >= 0 else -1.0]
+    else:
+        ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
+        sign = math.copysign(1.0, place)
+        above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
+        below = [m for m in ladder if m < abs(place)] or [1.0]
+        wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
+    nodes = []
+    for m in wanted:
+        value = float(np.clip(parameter.null + m * step, low, high)) - parameter.null
+        if value == 0.0:  # the limit is the null on that side
+            value = step
+        if value not in nodes:
+            nodes.append(value)
+    return nodes
