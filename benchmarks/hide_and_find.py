@@ -162,12 +162,8 @@ def draw_film(rng: np.random.Generator) -> Plan:
     return Plan("unknown", Hidden({"film": values}), float("nan"))
 
 
-def draw_plan(job: tuple[Campaign, Path | None, TruthTable, Catalogue, int, int]) -> Plan:
-    """One of the seven, with a p_m of its own; every one has a stream of random numbers to itself."""
-    campaign, store_at, truth, catalogue, seed, number = job
-    rng = np.random.default_rng([seed, number])
-    store = RunStore(store_at)
-    count = StrengthCount(campaign, store, replace(truth, store=store, workers=1))
+def draw_plan(rng: np.random.Generator, catalogue: Catalogue, count: StrengthCount, number: int) -> Plan:
+    """One of the seven, with a p_m of its own."""
     if number == 0:
         plan = Plan("none", Hidden(), 0.0)
     elif number <= len(KINDS):
@@ -178,6 +174,22 @@ def draw_plan(job: tuple[Campaign, Path | None, TruthTable, Catalogue, int, int]
         plan = draw_film(rng)
     p_m = MIDDLE * float(np.exp(SPREAD * rng.standard_normal()))
     return replace(plan, hidden=replace(plan.hidden, p_m=p_m))
+
+
+def hide_and_judge(
+    job: tuple[Campaign, Path | None, TruthTable, Catalogue, int, int],
+) -> tuple[Plan, dict]:
+    """Draw one campaign, from a stream of random numbers of its own, make it and judge it."""
+    campaign, store_at, truth, catalogue, seed, number = job
+    store, began = RunStore(store_at), time.process_time()
+    truth = replace(truth, store=store, workers=1)
+    count = StrengthCount(campaign, store, truth)
+    plan = draw_plan(np.random.default_rng([seed, number]), catalogue, count, number)
+    truth.prepare([plan.hidden])
+    drawing = time.process_time() - began
+    strength = plan.strength
+    row = judge_hidden((campaign, store_at, truth, plan.hidden, 10 * seed + number, strength, strength))
+    return plan, {**row, "drawing": drawing}
 
 
 def is_alike(name: str, hidden: str, alike: Mapping[str, Mapping[str, float]]) -> bool:
@@ -216,7 +228,7 @@ def describe(title: str, row: Mapping) -> str:
     return (
         f"{title:<11} {word:<6} hidden: {hidden or 'none'}{strength}; p_m {row['p_m']:.0f} Pa; "
         f"found: {ranked} ({values or 'nothing fitted'}; p_m {np.exp(row['log_p_m']):.0f} Pa); "
-        f"nominal fit p = {row['goodness']:.1g}; {row['wall']:.0f} s"
+        f"nominal fit p = {row['goodness']:.1g}; CPU {row['drawing']:.0f} s to hide, {row['cpu']:.0f} s to find"
     )
 
 
@@ -245,29 +257,21 @@ def main() -> None:
         rows: dict[str, dict] = {}
         with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool:
             known = truth.holding(Hidden())
-            order = sorted(
+            numbers = sorted(
                 range(len(KINDS) + 3), key=lambda number: number not in (5, 1)
             )  # the longest first
-            jobs = [(campaign, options.store, known, catalogue, options.seed, number) for number in order]
-            plans = list(pool.map(draw_plan, jobs))
-            print(f"strengths: {time.perf_counter() - began:.0f} s", flush=True)
-            truth.prepare([plan.hidden for plan in plans])
-            print(f"truths: {time.perf_counter() - began:.0f} s", flush=True)
-            judging = {}
-            for number, plan in zip(order, plans, strict=True):
-                seed, held = 10 * options.seed + number, truth.holding(plan.hidden)
-                job = (campaign, options.store, held, plan.hidden, seed, plan.strength, plan.strength)
-                judging[pool.submit(judge_hidden, job)] = plan.title
-            for future in as_completed(judging):
-                rows[judging[future]] = future.result()
-                print(describe(judging[future], rows[judging[future]]), flush=True)
+            jobs = [(campaign, options.store, known, catalogue, options.seed, number) for number in numbers]
+            for future in as_completed([pool.submit(hide_and_judge, job) for job in jobs]):
+                plan, row = future.result()
+                rows[plan.title] = row
+                print(describe(plan.title, row), flush=True)
     verdicts = {title: judge_row(title, row) for title, row in rows.items()}
     found = sum(found for found, _ in verdicts.values())
     wrong = sum(wrong for _, wrong in verdicts.values())
     failed = not verdicts["none"][0] or wrong > MOST_WRONG or found < LEAST_FOUND
     print(
         f"seed {options.seed}: {'FAILED' if failed else 'passed'}; none called {rows['none']['first']}; found {found} of "
-        f"{len(plans)} (at least {LEAST_FOUND}); wrong above 0.5: {wrong} (at most {MOST_WRONG}); "
+        f"{len(rows)} (at least {LEAST_FOUND}); wrong above 0.5: {wrong} (at most {MOST_WRONG}); "
         f"{time.perf_counter() - began:.0f} s"
     )
     sys.exit(failed)

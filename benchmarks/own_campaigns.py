@@ -122,7 +122,6 @@ def find_strengths(
     campaign, store_at, truth, name, side, sigmas = job
     store = RunStore(store_at)
     count = StrengthCount(campaign, store, replace(truth, store=store, workers=1))
-    count.truth.prepare([])
     return name, side, count.find(count.truth.effect(name), side, sigmas)
 
 
@@ -140,9 +139,9 @@ def find_all(
         for name, effect in list_effects(campaign.folder).items()
         if name not in NOT_HIDDEN and not effect.applies(campaign) and effect.amplitudes
     ]
-    empty = replace(truth, store=None, progress=None, tables={}, maps={})
+    nominal = truth.holding(Hidden())
     jobs = [
-        (campaign, store_at, empty, name, side, sigmas)
+        (campaign, store_at, nominal, name, side, sigmas)
         for name in sorted(names)
         if not wanted or name in wanted
         for side in (1, -1)
@@ -262,6 +261,7 @@ def main() -> None:
     campaign, templates = open_campaign(options.drops, options.maps)
     store = RunStore(options.store)
     truth = TruthTable(campaign, store, workers=options.workers, templates=tuple(templates))
+    truth.prepare([])
     plan: list[tuple[Found, float, int]] = []
     if options.each:
         sigmas = [float(s) for s in options.sigma.split(",")]

@@ -7,7 +7,7 @@ amplitude that was simulated nothing of the amplitude is interpolated.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -33,6 +33,8 @@ BEYOND = 1.02  # of the largest amplitude simulated
 DRIFT = "sample_drift"  # the effect that is a p_m of each drop
 Effects = Mapping[str, Mapping[str, float]]  # values of the parameters, by name of the effect
 Variant = tuple[str, float]  # what is simulated, and its amplitude
+NOMINAL: Variant = ("", 0.0)
+Encode = Callable[[DropRun], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -69,60 +71,72 @@ class TruthTable:
     maps: dict[tuple[str, float], ResponseTable] = field(default_factory=dict)
 
     def prepare(self, hidden: Sequence[Hidden]) -> None:
-        """All runs that these truths need, in one sweep. An amplitude at which one of its runs fails is left out."""
+        """All runs that these truths need and the table lacks, in one sweep; an amplitude at which one fails is left out."""
         place = next(iter(list_places(self.campaign).values()))
-        variants: dict[Variant, Effects] = {("", 0.0): {}}
+        variants: dict[Variant, Effects] = {NOMINAL: {}}
         variants |= {self._name(effects): effects for effects in map(self._costly, hidden) if effects}
-        families = [(p, v, False) for p, v in self._families().items()]
-        families += [(p, v, True) for p, v in self._scan_families().items()]
+        blurs = sorted({0.0, *(self._blur(each) for each in hidden)})
         jobs = [
-            (projectile, is_scan, variant, k, speed)
-            for projectile, speeds, is_scan in families
+            (family, variant, k)
+            for family in self._list_families(blurs)
             for variant in variants
-            for k in (CHANGED if variant[0] else range(len(STRENGTHS)))
-            for speed in speeds
+            for k in (range(len(STRENGTHS)) if variant == NOMINAL else CHANGED)
+            if any(_lacks(table, variant, k) for table, _ in family.tables)
         ]
         settings = [
             self.apply(
-                variants[variant], self.setting(projectile, speed, STRENGTHS[k], is_scan=is_scan), place
+                variants[variant],
+                self.setting(family.projectile, speed, STRENGTHS[k], is_scan=family.is_scan),
+                place,
             )
-            for projectile, is_scan, variant, k, speed in jobs
+            for family, variant, k in jobs
+            for speed in family.speeds
         ]
+        if not settings:
+            return
         runs = self.store.get_many(settings, workers=self.workers, progress=self.progress, text="truths")
-        groups: dict[tuple[Projectile, bool, Variant, int], list[DropRun]] = {}
-        failed = set()
-        for (projectile, is_scan, variant, k, _), run in zip(jobs, runs, strict=True):
-            if isinstance(run, DropRun) and run.stopped:
-                groups.setdefault((projectile, is_scan, variant, k), []).append(run)
-            else:
-                failed.add(variant)
-        if ("", 0.0) in failed:
+        parts, at = [], 0
+        for family, _, _ in jobs:
+            part = runs[at : at + len(family.speeds)]
+            parts.append([run for run in part if isinstance(run, DropRun) and run.stopped])
+            at += len(family.speeds)
+        failed = {
+            variant
+            for (family, variant, _), part in zip(jobs, parts, strict=True)
+            if len(part) < len(family.speeds)
+        }
+        if NOMINAL in failed:
             raise SimulationError("simulation", "truth", "a nominal run failed; nothing can be hidden")
-        blurs = {0.0, *(self._blur(each) for each in hidden)}
-        for projectile, speeds, is_scan in families:
-            tables = [(self.tables.setdefault(projectile, _table(speeds)), encode_run)] if not is_scan else []
-            if is_scan:
-                tables = [
-                    (
-                        self.maps.setdefault((each.scan.name, blur), _table(speeds)),
-                        partial(_encode_map, each, blur),
-                    )
-                    for each in self.templates
-                    if bare(each.scan.projectile) == projectile
-                    for blur in sorted(blurs)
-                ]
-            for table, encode in tables:
-                for k in range(len(STRENGTHS)):
-                    if k not in table.base:
-                        nominal = groups[projectile, is_scan, ("", 0.0), k]
-                        table.base[k] = np.array([encode(run) for run in nominal])
-                for (name, amplitude), k in [
-                    (v, k) for v in variants if v[0] and v not in failed for k in CHANGED
-                ]:
-                    known = table.changes.setdefault(name, {}).setdefault(k, {})
-                    if amplitude not in known:
-                        found = groups[projectile, is_scan, (name, amplitude), k]
-                        known[amplitude] = np.array([encode(run) for run in found]) - table.base[k]
+        # nominal ones come first: changes are differences from them
+        for (family, variant, k), part in sorted(
+            zip(jobs, parts, strict=True), key=lambda job: job[0][1] != NOMINAL
+        ):
+            for table, encode in family.tables if variant not in failed else ():
+                codes = np.array([encode(run) for run in part])
+                if variant == NOMINAL:
+                    table.base[k] = codes
+                else:
+                    name, amplitude = variant
+                    table.changes.setdefault(name, {}).setdefault(k, {})[amplitude] = codes - table.base[k]
+
+    def _list_families(self, blurs: Sequence[float]) -> list[Family]:
+        """All that is simulated with one projectile, with the tables that it fills; those of scans for these blurs."""
+        families = []
+        for projectile, speeds in self._families().items():
+            table = self.tables.setdefault(projectile, _table(speeds))
+            families.append(Family(projectile, speeds, False, [(table, encode_run)]))
+        for projectile, speeds in self._scan_families().items():
+            seen: list[tuple[ResponseTable, Encode]] = [
+                (
+                    self.maps.setdefault((each.scan.name, blur), _table(speeds)),
+                    partial(_encode_map, each, blur),
+                )
+                for each in self.templates
+                if bare(each.scan.projectile) == projectile
+                for blur in blurs
+            ]
+            families.append(Family(projectile, speeds, True, seen))
+        return families
 
     def code(self, hidden: Hidden, projectile: Projectile, log_p_m: float, log_speed: float) -> FloatArray:
         """Code of one drop of a truth."""
@@ -172,7 +186,7 @@ class TruthTable:
     def _name(self, effects: Effects) -> Variant:
         """What is simulated together, and its amplitude."""
         if len(effects) != 1:
-            return (_say(effects), 1.0) if effects else ("", 0.0)
+            return (_say(effects), 1.0) if effects else NOMINAL
         ((name, values),) = effects.items()
         parameter = self.effect(name).amplitudes[0]
         rest = {key: value for key, value in values.items() if key != parameter.name}
@@ -226,6 +240,22 @@ class TruthTable:
         for name, values in hidden.effects.items():
             instrument = self.effect(name).apply_to_instrument(instrument, values, place)
         return instrument
+
+
+@dataclass(frozen=True)
+class Family:
+    """Runs with one projectile, at these speeds (m/s), and the tables that their codes go to."""
+
+    projectile: Projectile
+    speeds: tuple[float, ...]
+    is_scan: bool
+    tables: list[tuple[ResponseTable, Encode]]
+
+
+def _lacks(table: ResponseTable, variant: Variant, k: int) -> bool:
+    if variant == NOMINAL:
+        return k not in table.base
+    return variant[1] not in table.changes.get(variant[0], {}).get(k, {})
 
 
 def _table(speeds: Sequence[float]) -> ResponseTable:
