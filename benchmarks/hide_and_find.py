@@ -115,7 +115,7 @@ def find_either(count: StrengthCount, name: str, sigma: float, side: int) -> Fou
     """What is this strong on this side of null, or else on the other; None where limits allow neither."""
     effect = count.truth.effect(name)
     for each in (side, -side):
-        found = count.find(effect, each, [sigma])
+        found = count.find(effect, each, [sigma]).found
         if found:
             return found[sigma]
     return None
@@ -145,7 +145,7 @@ def draw_pair(rng: np.random.Generator, catalogue: Catalogue, count: StrengthCou
         if np.max(np.abs(together)) > CONFUSABLE:
             continue
         found = [
-            count.find(count.truth.effect(n), side, [s]).get(s)
+            count.find(count.truth.effect(n), side, [s]).found.get(s)
             for n, (s, side) in zip(pair, drawn, strict=True)
         ]
         if all(found):

@@ -35,7 +35,7 @@ from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
-from labsim.inference.strength import Found, StrengthCount
+from labsim.inference.strength import Found, Search, StrengthCount
 from labsim.inference.synthetic import measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
@@ -117,7 +117,7 @@ def judge_hidden(
 
 def find_strengths(
     job: tuple[Campaign, Path | None, TruthTable, str, int, list[float]],
-) -> tuple[str, int, dict[float, Found]]:
+) -> tuple[str, int, Search]:
     """Amplitudes of one effect on one side of null."""
     campaign, store_at, truth, name, side, sigmas = job
     store = RunStore(store_at)
@@ -132,7 +132,7 @@ def find_all(
     sigmas: list[float],
     wanted: set[str],
     workers: int,
-) -> dict[str, dict[int, dict[float, Found]]]:
+) -> dict[str, dict[int, Search]]:
     """What to hide of every effect that can be at work in the campaign, or of those wanted: by effect, side of null, strength."""
     names = [
         name
@@ -146,32 +146,36 @@ def find_all(
         if not wanted or name in wanted
         for side in (1, -1)
     ]
-    found: dict[str, dict[int, dict[float, Found]]] = {}
+    found: dict[str, dict[int, Search]] = {}
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for name, side, sides in pool.map(find_strengths, jobs):
+        for name, side, search in pool.map(find_strengths, jobs):
             unit = truth.effect(name).amplitudes[0].unit
-            said = ", ".join(
+            said = [
                 f"{next(iter(each.hidden.effects[name].values())):.4g} {unit} is {each.strength:.1f}"
-                for each in sides.values()
-            )
-            missed = ", ".join(f"{sigma:.0f}" for sigma in sigmas if sigma not in sides)
-            missed = f"; left out: {missed} sigma, beyond its limits or its runs" if missed else ""
-            print(f"{name} {'+' if side > 0 else '-'}: {said or 'nothing'}{missed}", flush=True)
-            found.setdefault(name, {})[side] = sides
+                for each in search.found.values()
+            ]
+            if missed := [f"{sigma:.0f}" for sigma in sigmas if sigma not in search.found]:
+                said.append(
+                    f"{', '.join(missed)} sigma left out: {search.most:.1f} is the most, {search.end}"
+                    if search.strengths
+                    else "null is its limit"
+                )
+            print(f"{name} {'+' if side > 0 else '-'}: {', '.join(said)}", flush=True)
+            found.setdefault(name, {})[side] = search
     return found
 
 
 def plan_hidden(
-    found: dict[str, dict[int, dict[float, Found]]], sigmas: list[float], each: int
+    found: dict[str, dict[int, Search]], sigmas: list[float], each: int
 ) -> list[tuple[Found, float, int]]:
     """(what is hidden, strength asked for, seed), the sides of null in turn."""
     plan = []
     for name, sides in found.items():
         number = 1000 * sum(ord(letter) * 31**k for k, letter in enumerate(name)) % 10**9
         for turn, sigma in enumerate(sigmas):
-            able = [side for side in sides if sigma in sides[side]]
+            able = [side for side in sides if sigma in sides[side].found]
             for k in range(each if able else 0):
-                chosen = sides[able[(len(name) + turn + k) % len(able)]][sigma]
+                chosen = sides[able[(len(name) + turn + k) % len(able)]].found[sigma]
                 plan.append((chosen, sigma, number + 10 * round(sigma) + k))
     return plan
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import Effect
-from ..errors import SimulationError
+from ..errors import ExtrapolationError, SimulationError
 from ..records import Campaign
 from .calibrate import prepare
 from .runs import RunStore
@@ -62,34 +62,38 @@ class StrengthCount:
         self.truth.prepare([hidden])
         return self.measure(hidden)
 
-    def find(self, effect: Effect, side: int, wanted: Sequence[float]) -> dict[float, Found]:
+    def find(self, effect: Effect, side: int, wanted: Sequence[float]) -> Search:
         """Amplitudes on one side of null (+1, -1) that are as strong as wanted; those that no amplitude reaches are left out.
 
         Runs are made at powers of RATIO times the effect's step, the same for every campaign; between them what they change is
         interpolated, and what is found is simulated and counted itself.
         """
-        strengths = self._walk(effect, side, min(wanted), max(wanted))
+        strengths, end = self._walk(effect, side, min(wanted), max(wanted))
         found = {}
         for sigma in wanted:
             amplitude = self._search(effect, dict(strengths), sigma)
             if amplitude is not None:
                 found[sigma] = amplitude
-        return found
+        return Search(found, strengths, end)
 
-    def _walk(self, effect: Effect, side: int, least: float, most: float) -> dict[float, float]:
-        """Strengths at amplitudes that enclose those looked for, as far as limits and runs allow."""
+    def _walk(self, effect: Effect, side: int, least: float, most: float) -> tuple[dict[float, float], str]:
+        """Strengths at amplitudes that enclose those looked for, as far as limits and runs allow, and where they ended."""
         strengths: dict[float, float] = {}
-        power, end = 0, False
-        while not end and len(strengths) < MOST_NODES:
-            amplitude, end = _rung(effect, side, power)
+        power, end = 0, "at its limit"
+        while True:
+            amplitude, last = _rung(effect, side, power)
             if amplitude == 0.0:
                 break
             try:
                 sigma = self.simulate(effect, amplitude)
-            except SimulationError:  # so much of it ends no run, or no fit
+            except (SimulationError, ExtrapolationError):  # so much of it ends no run, or no fit
+                end = f"runs or fits fail at {amplitude:.4g}"
                 break
             strengths[amplitude] = sigma
-            if sigma > most:
+            if last or sigma > most:
+                break
+            if len(strengths) == MOST_NODES:
+                end = "not looked for further"
                 break
             stride = min(max(most / max(sigma, LEAST), RATIO), STRIDE)
             power += math.ceil(math.log(stride) / math.log(RATIO) - 1e-9)
@@ -99,7 +103,7 @@ class StrengthCount:
             power -= max(math.floor(math.log(excess) / math.log(RATIO)), 1)
             amplitude, _ = _rung(effect, side, power)
             strengths[amplitude] = self.simulate(effect, amplitude)
-        return strengths
+        return strengths, end
 
     def _search(self, effect: Effect, strengths: dict[float, float], sigma: float) -> Found | None:
         """Secant steps in logarithms of amplitude and strength; the last one is simulated."""
@@ -127,6 +131,20 @@ class Found:
 
     hidden: Hidden
     strength: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """found : by strength wanted; strengths : at the amplitudes tried; end : why no larger one was."""
+
+    found: dict[float, Found]
+    strengths: dict[float, float]
+    end: str
+
+    @property
+    def most(self) -> float:
+        """Of the strengths; 0 where null is the limit on this side."""
+        return max(self.strengths.values(), default=0.0)
 
 
 def hide(effect: Effect, amplitude: float, shapes: Mapping[str, float] | None = None) -> Hidden:

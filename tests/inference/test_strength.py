@@ -54,7 +54,7 @@ def test_strength_grows_with_the_amplitude(count):
 def test_the_amplitude_found_is_as_strong_as_wanted(count):
     effect = count.truth.effect("pixel_scale")
     for side in (1, -1):
-        found = count.find(effect, side, [2.0, 4.0])
+        found = count.find(effect, side, [2.0, 4.0]).found
         for sigma, each in found.items():
             assert each.strength == pytest.approx(sigma, rel=0.03)
             assert count.measure(each.hidden) == pytest.approx(sigma, rel=0.03)
@@ -62,4 +62,5 @@ def test_the_amplitude_found_is_as_strong_as_wanted(count):
 
 
 def test_a_side_beyond_the_limits_is_left_out(count):
-    assert count.find(count.truth.effect("side_friction"), -1, [4.0]) == {}
+    search = count.find(count.truth.effect("side_friction"), -1, [4.0])
+    assert search.found == {} and search.most == 0.0
