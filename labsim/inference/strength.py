@@ -25,6 +25,7 @@ from .truth import Hidden, TruthTable
 RATIO = 2.0  # of amplitudes simulated, powers of it times the effect's step
 STRIDE = 4.0  # at once, at most
 MOST_NODES = 5  # amplitudes simulated on one side of null
+HOPE = 1.5  # factor by which the strength at a limit may beat its projection
 LOWEST = 2.5  # times the least strength looked for that the smallest amplitude simulated may have
 SETTLED, ACCEPTED = 0.03, 0.1  # of a strength, off what is wanted: between runs, at a run
 SIMULATED = 2  # amplitudes simulated for one strength
@@ -91,6 +92,9 @@ class StrengthCount:
                 break
             strengths[amplitude] = sigma
             if last or sigma > most:
+                break
+            if HOPE * _project(effect, strengths) < least:
+                end = "grows too little"
                 break
             if len(strengths) == MOST_NODES:
                 end = "not looked for further"
@@ -164,6 +168,17 @@ def _aim(strengths: Mapping[float, float], sigma: float) -> float:
     share = math.log(sigma / at_low) / math.log(at_high / at_low)
     share = min(max(share, -2.0), 1.0)
     return float(f"{math.copysign(abs(low) ** (1 - share) * abs(high) ** share, high):.4g}")
+
+
+def _project(effect: Effect, strengths: Mapping[float, float]) -> float:
+    """Strength at the limit if it goes on as between the last two amplitudes; infinite after one."""
+    if len(strengths) < 2:
+        return math.inf
+    (before, at_before), (last, at_last) = list(strengths.items())[-2:]
+    parameter = effect.amplitudes[0]
+    limit = parameter.limits[last > 0] - parameter.null
+    slope = math.log(max(at_last, LEAST) / max(at_before, LEAST)) / math.log(last / before)
+    return float(at_last * (limit / last) ** max(slope, 0.0))
 
 
 def _rung(effect: Effect, side: int, power: int) -> tuple[float, bool]:
