@@ -10,29 +10,28 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from own_campaigns import append_rows, interval, open_campaign, read_rows
 
-from labsim.ct.reduce import ReducedScan
 from labsim.inference.calibrate import prepare, sample_fit
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
-from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.inference.synthetic import measure_hidden
+from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign
 
 SPREAD = 0.15  # of ln p_m about 1300 Pa, inside the truth's own nodes
 
 
-def calibrate_hidden(job: tuple[Campaign, list[ReducedScan], Path | None, TruthTable, int]) -> dict:
+def calibrate_hidden(job: tuple[Campaign, Path | None, TruthTable, int]) -> dict:
     """Film one nominal campaign and calibrate it."""
-    campaign, templates, store, truth, seed = job
+    campaign, store, truth, seed = job
     rng = np.random.default_rng(seed)
     p_m = float(np.exp(np.log(1300.0) + SPREAD * rng.standard_normal()))
-    measurements = measure_hidden(truth, Hidden(p_m=p_m), rng, templates=templates)
+    measurements = measure_hidden(truth, Hidden(p_m=p_m), rng)
     began = time.perf_counter()
     bench, fit = prepare(campaign, RunStore(store), workers=1, measurements=measurements)
     samples = sample_fit(bench, fit, seed=seed).samples("p_m_Pa")
@@ -61,11 +60,12 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out / "rows.jsonl"
     campaign, templates = open_campaign("", True)
-    truth = TruthTable(campaign, RunStore(options.store), workers=options.workers)
+    store = RunStore(options.store)
+    truth = TruthTable(campaign, store, workers=options.workers, templates=tuple(templates))
     truth.prepare([])
     done = {row["seed"] for row in read_rows(log)}
     jobs = [
-        (campaign, templates, options.store, replace(truth, store=None), seed)
+        (campaign, options.store, truth.holding(Hidden()), seed)
         for seed in range(70_000, 70_000 + options.campaigns)
         if seed not in done
     ]

@@ -1,12 +1,13 @@
 """Hide effects in campaigns of labsim's own solver at another spacing, and count what the diagnosis finds.
 
-    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 3] [--sigma 8,16] [--workers 2] [--drops D01,D02]
-                                           [--effects a,b] [--maps]
+    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 2] [--sigma 8,16] [--workers 2] [--drops D01,D02]
+                                           [--effects a,b] [--maps] [--store FOLDER] [--plan]
 
-Writes OUT/rows.jsonl, one line a campaign; a second call goes on where the first stopped. Prints false alarms and coverage on
-the nulls, exact and class hit rates per strength, p_m coverage with the extension, a reliability table of the probabilities.
-The strength of an effect is its amplitude times the length of its fingerprint in the nominal campaign, in standard
-deviations. OMP_NUM_THREADS=1 keeps the workers out of each other's way.
+Writes OUT/strengths.json, what is hidden, and OUT/rows.jsonl, one line a campaign; a second call goes on where the first
+stopped. Prints false alarms and coverage on the nulls, exact and class hit rates per strength, p_m coverage with the extension, a
+reliability table of the probabilities. --plan stops after the strengths. The strength of an effect is what the best nominal fit
+leaves of it in a campaign without noise (labsim.inference.strength), in standard deviations; every draw takes the other side of
+null where it has two. OMP_NUM_THREADS=1 keeps the workers out of each other's way.
 """
 
 from __future__ import annotations
@@ -30,20 +31,25 @@ from scipy.stats import beta
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
 from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
-from labsim.effects import Effect
+from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
-from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.inference.strength import Found, Search, StrengthCount
+from labsim.inference.synthetic import measure_hidden
+from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 
 CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
 LABELLED_SCANS = CAMPAIGN.parents[1] / "ct" / "labelled_scans"
 SCANS = [LABELLED_SCANS / name for name in ("p01-C01", "p05-C02")]  # frames, masks and errors of maps
-# no truth of their own here; a floor has no tangent that a strength could be counted in
+# rods of 0.5 mm and of 1.5 mm radius, slow to fast
+STANDARD = "D01,D02,D03,D05,D06,D07,D11,D13,D14"
+# no truth of their own here; a floor is felt or not, which leaves nothing to choose a strength by
 NOT_HIDDEN = ("resolution", "planar_geometry", "gravity", "hard_floor")
+SPREAD = 0.15  # of ln p_m about the middle, inside the truth's own nodes
+MIDDLE = 1300.0  # Pa
 VOXEL = 40e-6  # m
-OFF_DEFAULT = 0.8  # hidden shapes are this share of the stated one
 
 
 def open_campaign(drops: str, maps: bool) -> tuple[Campaign, list[ReducedScan]]:
@@ -64,12 +70,12 @@ def open_campaign(drops: str, maps: bool) -> tuple[Campaign, list[ReducedScan]]:
 
 
 def judge_hidden(
-    job: tuple[Campaign, list[ReducedScan], Path | None, TruthTable, Hidden, int, float],
+    job: tuple[Campaign, Path | None, TruthTable, Hidden, int, float, float],
 ) -> dict:
     """Film one truth and judge it."""
-    campaign, templates, store_at, truth, hidden, seed, strength = job
-    began = time.perf_counter()
-    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed), templates=templates)
+    campaign, store_at, truth, hidden, seed, strength, counted = job
+    began, busy = time.perf_counter(), time.process_time()
+    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed))
     found = judge_campaign(*prepare(campaign, RunStore(store_at), workers=1, measurements=measurements))
     names = found.screening.names
     alike = {
@@ -88,6 +94,7 @@ def judge_hidden(
         "cause": hidden.cause,
         "values": {name: dict(values) for name, values in hidden.effects.items()},
         "strength": strength,
+        "counted": counted,
         "seed": seed,
         "p_m": hidden.p_m,
         "log_p_m": found.best.log_p_m,
@@ -104,39 +111,73 @@ def judge_hidden(
         "goodness": goodness_of_fit(found.nominal),
         "p_value": found.p_value,
         "wall": time.perf_counter() - began,
+        "cpu": time.process_time() - busy,
     }
 
 
-def set_strength(effect: Effect, signal: float, sigma: float, sign: int) -> dict[str, float] | None:
-    """Values of an effect that is this many standard deviations of its fingerprint; None beyond its limits."""
-    parameter = effect.amplitudes[0]
-    value = parameter.null + sign * sigma / signal
-    if not parameter.limits[0] <= value <= parameter.limits[1]:
-        return None
-    return {parameter.name: value, **{p.name: OFF_DEFAULT * p.null for p in effect.parameters if p.shape}}
+def find_strengths(
+    job: tuple[Campaign, Path | None, TruthTable, str, int, list[float]],
+) -> tuple[str, int, Search]:
+    """Amplitudes of one effect on one side of null."""
+    campaign, store_at, truth, name, side, sigmas = job
+    store = RunStore(store_at)
+    count = StrengthCount(campaign, store, replace(truth, store=store, workers=1))
+    return name, side, count.find(count.truth.effect(name), side, sigmas)
 
 
-def choose_amplitudes(
-    campaign: Campaign, store: RunStore, truth: TruthTable, sigmas: list[float], workers: int
-) -> list:
-    """(hidden, strength) of every effect at every strength that its limits allow, with alternating signs."""
-    measurements = measure_hidden(truth, Hidden(), np.random.default_rng(0))
-    found = judge_campaign(*prepare(campaign, store, workers=workers, measurements=measurements))
-    signal = {score.name: score.signal for score in found.screening.scores}
-    chosen = []
-    for number, (name, effect) in enumerate(sorted(found.bench.effects.items())):
-        if name in NOT_HIDDEN or name not in signal:
-            continue
-        for k, sigma in enumerate(sigmas):
-            for sign in ((-1) ** (number + k), -((-1) ** (number + k))):
-                values = set_strength(effect, signal[name], sigma, sign)
-                if values is not None:
-                    chosen.append((Hidden({name: values}), sigma))
-                    break
-            else:
-                size, unit = sigma / signal[name], effect.amplitudes[0].unit
-                print(f"{name}: {sigma:.0f} sigma would be {size:.3g} {unit} from null, outside its limits")
-    return chosen
+def find_all(
+    campaign: Campaign,
+    store_at: Path | None,
+    truth: TruthTable,
+    sigmas: list[float],
+    wanted: set[str],
+    workers: int,
+) -> dict[str, dict[int, Search]]:
+    """What to hide of every effect that can be at work in the campaign, or of those wanted: by effect, side of null, strength."""
+    names = [
+        name
+        for name, effect in list_effects(campaign.folder).items()
+        if name not in NOT_HIDDEN and not effect.applies(campaign) and effect.amplitudes
+    ]
+    nominal = truth.holding(Hidden())
+    jobs = [
+        (campaign, store_at, nominal, name, side, sigmas)
+        for name in sorted(names)
+        if not wanted or name in wanted
+        for side in (1, -1)
+    ]
+    found: dict[str, dict[int, Search]] = {}
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        for name, side, search in pool.map(find_strengths, jobs):
+            unit = truth.effect(name).amplitudes[0].unit
+            said = [
+                f"{next(iter(each.hidden.effects[name].values())):.4g} {unit} is {each.strength:.1f}"
+                for each in search.found.values()
+            ]
+            if missed := [f"{sigma:.0f}" for sigma in sigmas if sigma not in search.found]:
+                said.append(
+                    f"{', '.join(missed)} sigma left out: {search.most:.1f} is the most, {search.end}"
+                    if search.strengths
+                    else "null is its limit"
+                )
+            print(f"{name} {'+' if side > 0 else '-'}: {', '.join(said)}", flush=True)
+            found.setdefault(name, {})[side] = search
+    return found
+
+
+def plan_hidden(
+    found: dict[str, dict[int, Search]], sigmas: list[float], each: int
+) -> list[tuple[Found, float, int]]:
+    """(what is hidden, strength asked for, seed), the sides of null in turn."""
+    plan = []
+    for name, sides in found.items():
+        number = 1000 * sum(ord(letter) * 31**k for k, letter in enumerate(name)) % 10**9
+        for turn, sigma in enumerate(sigmas):
+            able = [side for side in sides if sigma in sides[side].found]
+            for k in range(each if able else 0):
+                chosen = sides[able[(len(name) + turn + k) % len(able)]].found[sigma]
+                plan.append((chosen, sigma, number + 10 * round(sigma) + k))
+    return plan
 
 
 def interval(hits: pd.Series) -> str:
@@ -167,7 +208,10 @@ def report(rows: list[dict]) -> None:
         )
         print(f"  p_m in its 90 % interval {interval(nulls.inside)}")
     for strength, some in table[table.cause != "none"].groupby("strength"):
-        print(f"{strength:.0f} sigma: exact {interval(some.exact)}; class {interval(some['class'])}")
+        spread = f"{some.counted.min():.1f} to {some.counted.max():.1f} counted"
+        print(
+            f"{strength:.0f} sigma ({spread}): exact {interval(some.exact)}; class {interval(some['class'])}"
+        )
         print(f"  exact where no other is alike {interval(some.exact[some.alone])}")
         print(
             f"  wrong above 0.5 {interval(some.named & ~some['class'])}; p_m in its 90 % interval {interval(some.inside)}"
@@ -178,7 +222,10 @@ def report(rows: list[dict]) -> None:
     for _, some in table.groupby(pd.cut(table.probability, [0.0, 0.5, 0.8, 0.95, 0.99, 1.0])):
         if len(some):
             print(f"  mean {some.probability.mean():.3f}: true {interval(some.exact)}")
-    print(f"median wall {table.wall.median():.1f} s")
+    for hidden, some in (("nulls", nulls), ("effects", table[table.cause != "none"])):
+        if len(some):
+            busy = f"CPU {some.cpu.median():.1f} s (median), {some.cpu.mean():.1f} s (mean)"
+            print(f"{hidden}: wall {some.wall.median():.1f} s (median), {busy}")
 
 
 def read_rows(log: Path) -> list[dict]:
@@ -203,42 +250,49 @@ def main() -> None:
     )
     parser.add_argument("out", type=Path)
     parser.add_argument("--nulls", type=int, default=100)
-    parser.add_argument("--each", type=int, default=3)
+    parser.add_argument("--each", type=int, default=2)
     parser.add_argument("--sigma", default="8,16")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--drops", default="")
+    parser.add_argument("--drops", default=STANDARD, help="names with commas; empty for all of the campaign")
     parser.add_argument("--effects", default="")
     parser.add_argument("--store", type=Path, default=None)
     parser.add_argument("--maps", action="store_true", help="maps of the compacted zone too")
+    parser.add_argument("--plan", action="store_true", help="strengths only, no campaign")
     options = parser.parse_args()
+    began = time.perf_counter()
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out / "rows.jsonl"
     campaign, templates = open_campaign(options.drops, options.maps)
     store = RunStore(options.store)
-    truth = TruthTable(campaign, store, workers=options.workers)
+    truth = TruthTable(campaign, store, workers=options.workers, templates=tuple(templates))
     truth.prepare([])
-    chosen = []
+    plan: list[tuple[Found, float, int]] = []
     if options.each:
         sigmas = [float(s) for s in options.sigma.split(",")]
-        chosen = choose_amplitudes(campaign, store, truth, sigmas, options.workers)
         wanted = {name for name in options.effects.split(",") if name}
-        chosen = [(hidden, sigma) for hidden, sigma in chosen if not wanted or hidden.cause in wanted]
-        truth.prepare([hidden for hidden, _ in chosen])
-    truth.progress = None
-    draw = np.random.default_rng(20090101)
-    plan = [(Hidden(), 1000 + k, 0.0) for k in range(options.nulls)]
-    plan += [(h, 5000 + 100 * n + k, s) for n, (h, s) in enumerate(chosen) for k in range(options.each)]
-    done = {(row["cause"], row["seed"]) for row in read_rows(log)}
+        found = find_all(campaign, options.store, truth, sigmas, wanted, options.workers)
+        plan = plan_hidden(found, sigmas, options.each)
+        said = [(f.hidden.cause, dict(f.hidden.effects), f.strength, sigma, seed) for f, sigma, seed in plan]
+        (options.out / "strengths.json").write_text(json.dumps(said, indent=1), encoding="utf-8")
+    truth.prepare([each.hidden for each, _, _ in plan])  # at the very amplitudes that are hidden
+    print(f"strengths and truths: {time.perf_counter() - began:.0f} s", flush=True)
+    if options.plan:
+        return
+    plan = [(Found(Hidden(), 0.0), 0.0, 1000 + k) for k in range(options.nulls)] + plan
+    done = {(row["cause"], row["strength"], row["seed"]) for row in read_rows(log)}
     jobs = []
-    for hidden, seed, sigma in plan:
-        hidden = replace(hidden, p_m=float(np.exp(np.log(1300.0) + 0.15 * draw.standard_normal())))
-        if (hidden.cause, seed) not in done:
-            jobs.append((campaign, templates, options.store, replace(truth, store=None), hidden, seed, sigma))
+    for each, sigma, seed in plan:
+        p_m = MIDDLE * math.exp(SPREAD * np.random.default_rng([20090101, seed]).standard_normal())
+        hidden = replace(each.hidden, p_m=p_m)
+        if (hidden.cause, sigma, seed) not in done:
+            known = truth.holding(hidden)
+            jobs.append((campaign, options.store, known, hidden, seed, sigma, each.strength))
     append_rows(
         log, judge_hidden, jobs, options.workers,
         lambda row: f" {row['cause']} {row['strength']:.0f}: {row['first']} {row['probability']:.2f}",
     )  # fmt: skip
     report(read_rows(log))
+    print(f"all {time.perf_counter() - began:.0f} s")
 
 
 if __name__ == "__main__":

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
+from labsim.errors import SimulationError
 from labsim.inference.curves import encode_run
-from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.inference.synthetic import measure_hidden
+from labsim.inference.truth import Hidden, TruthTable
 from labsim.sph import simulate
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
@@ -50,8 +52,8 @@ def test_a_pair_is_named_in_one_order():
 
 def test_a_pair_has_the_runs_of_the_one_that_costs_runs(truth):
     frictions = [setting.material.contact_friction for setting in truth.store.settings]
-    nodes = len(frictions) // 4  # three strengths without, the middle one with it, once for pair and single
-    assert frictions == 3 * nodes * [0.0] + nodes * [0.5]
+    nodes = len(frictions) // 5  # three strengths without, two with it, once for pair and single
+    assert frictions == 3 * nodes * [0.0] + 2 * nodes * [0.5]
     drop = truth.campaign.drops[0]
     plain, rough = (encode_run(truth.store.runs[mu]) for mu in (0.0, 0.5))
     assert abs(rough[0] - plain[0]) > 0.02  # of ln depth: the friction is felt
@@ -65,3 +67,17 @@ def test_both_of_a_pair_are_in_the_film(truth):
     noise = 0.1 * both.drop.camera.pixel_size  # of the row of the surface and of the deepest frame
     assert both.depth.max() == pytest.approx(rough.depth.max() / 1.05, abs=noise)
     assert both.depth.max() < scaled.depth.max() - 5 * noise
+
+
+def test_what_was_not_simulated_is_between_what_was(truth):
+    projectile, place = truth.campaign.drops[0].projectile, (np.log(1300.0), np.log(0.3))
+    plain, half, rough = (
+        truth.code(Hidden({"contact_friction": {"mu": mu}}), projectile, *place) for mu in (0.0, 0.25, 0.5)
+    )
+    assert half == pytest.approx((plain + rough) / 2, abs=1e-9)
+    with pytest.raises(SimulationError, match="has no runs that far"):
+        truth.code(Hidden({"contact_friction": {"mu": 0.6}}), projectile, *place)
+    kept = truth.holding(Hidden(FRICTION))
+    assert np.array_equal(kept.code(Hidden(FRICTION), projectile, *place), rough)
+    with pytest.raises(SimulationError):
+        truth.holding(Hidden(PIXELS)).code(Hidden(FRICTION), projectile, *place)
