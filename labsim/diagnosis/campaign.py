@@ -13,6 +13,7 @@ from ..errors import ExtrapolationError
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
 from ..inference.fitting import Fit, Hypothesis, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
+from ..inference.nodes import amplitude_nodes, own_node
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.workbench import Workbench
@@ -33,6 +34,8 @@ MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for t
 NARROW = 15.0  # the same between effects whose order more runs may change
 MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
 LARGE = 0.5  # of an effect's step
+MOST_MOVED = 2  # times that runs are made at the strength and amplitude itself
+MOVED = 0.5  # of its standard deviation, that asks for them once more
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
@@ -219,11 +222,26 @@ def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
         ):
             again.add(cause(name))
             with suppress(ExtrapolationError):
-                fit = fit_hypothesis(
-                    bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit
-                )
+                fit = _settle(bench, fit)
         settled.append(fit)
     return settled
+
+
+def _settle(bench: Workbench, fit: Fit) -> Fit:
+    """The fit among runs about it, then among runs at its own strength and amplitude too, until these move it no more."""
+    name = fit.hypothesis[0]
+    fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
+    for _ in range(MOST_MOVED):
+        nodes = amplitude_nodes(bench.effects[name], fit.values[name], around=True)
+        nodes.append(float(f"{fit.values[name]:.2g}"))
+        index = own_node(fit.log_p_m)
+        bench.require_base([index])
+        bench.require_changes([(name, amplitude, index) for amplitude in nodes], name)
+        before = fit
+        fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
+        if abs(fit.values[name] - before.values[name]) < MOVED * math.sqrt(before.covariance[1, 1]):
+            break
+    return fit
 
 
 def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:

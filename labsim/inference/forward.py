@@ -1,7 +1,7 @@
 """What the simulation says a drop's camera should have recorded, for any p_m, speed and amplitudes of effects near the runs.
 
 Codes of runs (curves.py) are interpolated in ln v over all speed nodes and in ln p_m over all strength nodes; an effect adds the
-difference its own runs made, a polynomial in its amplitude that vanishes at null, through up to three strength nodes.
+difference its own runs made, a smooth curve in its amplitude that vanishes at null, and one through all its strength nodes.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 from ..errors import ExtrapolationError
 from ..records import FloatArray
 from .curves import decode_depth, decode_rate
-from .grid import STRENGTH_RATIO, interpolation_weights, strength_node
+from .grid import STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
 
 STANDARD_GRAVITY = 9.81
 
 
-Changes = dict[int, dict[float, FloatArray]]
+Changes = dict[float, dict[float, FloatArray]]
 
 
 @dataclass
@@ -31,7 +31,7 @@ class ResponseTable:
 
     log_speeds: FloatArray
     few: tuple[int, ...]
-    base: dict[int, FloatArray] = field(default_factory=dict)
+    base: dict[float, FloatArray] = field(default_factory=dict)
     changes: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
 
@@ -46,9 +46,8 @@ class ResponseTable:
                 "simulation", "runs", "every run of one projectile failed; see labsim runs"
             )
         across = interpolation_weights(self.log_speeds, log_speed)
-        nearest, nodes = _nearest(self.base, log_p_m, 4)
-        weights = interpolation_weights(nodes, log_p_m)
-        plain = sum(weight * (across @ self.base[k]) for k, weight in zip(nearest, weights, strict=True))
+        weights = smooth_weights(_log_strengths(self.base), log_p_m)
+        plain = sum(weight * (across @ codes) for codes, weight in zip(self.base.values(), weights, strict=True))
         return Response(self, log_p_m, log_speed, across, np.asarray(plain))
 
 
@@ -77,23 +76,22 @@ class Response:
         else:
             few = self.table.log_speeds[list(self.table.few)]
             runs, across = self.table.fingerprints[name], interpolation_weights(few, self.log_speed)
-        nearest, nodes = _nearest([index for index in runs if runs[index]], self.log_p_m, 3)
+        indices = [index for index in runs if runs[index]]
+        nodes = _log_strengths(indices)
         margin = 0.5 * math.log(STRENGTH_RATIO)
         inside = min(max(self.log_p_m, nodes.min() - margin), nodes.max() + margin)
         change = 0.0
-        for index, weight in zip(nearest, interpolation_weights(nodes, inside), strict=True):
-            known = sorted(runs[index], key=lambda a: abs(a - amplitude))[:3]
-            shares = interpolation_weights(np.array([0.0, *known]), amplitude)[1:]
+        for index, weight in zip(indices, smooth_weights(nodes, inside), strict=True):
+            known = list(runs[index])
+            shares = smooth_weights([0.0, *known], amplitude)[1:]
             part = sum(share * (across @ runs[index][a]) for a, share in zip(known, shares, strict=True))
             change = weight * part + change
         return np.asarray(change)
 
 
-def _nearest(indices: Iterable[int], log_p_m: float, count: int) -> tuple[list[int], FloatArray]:
-    """The strength indices nearest to a value, nearest first, and ln of their p_m."""
-    nodes = {index: math.log(strength_node(index)) for index in indices}
-    nearest = sorted(nodes, key=lambda index: abs(nodes[index] - log_p_m))[:count]
-    return nearest, np.array([nodes[index] for index in nearest])
+def _log_strengths(indices: Iterable[float]) -> FloatArray:
+    """ln of p_m at strength nodes."""
+    return np.array([math.log(strength_node(index)) for index in indices])
 
 
 @dataclass(frozen=True)

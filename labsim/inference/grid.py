@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ..records import Campaign, FloatArray, Projectile
 from ..sph import DropRun, DropSetting
@@ -49,7 +51,7 @@ class Request:
 
     variant: str
     change: Change | None
-    index: int
+    index: float
     cells: int | None
 
 
@@ -75,7 +77,7 @@ def few_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tu
     return tuple(sorted({0, (len(speeds) - 1) // 2 + (len(speeds) % 2 == 0), len(speeds) - 1}))
 
 
-def strength_node(index: int) -> float:
+def strength_node(index: float) -> float:
     return STRENGTH_ANCHOR * STRENGTH_RATIO**index
 
 
@@ -84,6 +86,24 @@ def interpolation_weights(nodes: FloatArray, at: float) -> FloatArray:
     own = np.eye(len(nodes), dtype=bool)
     apart = np.where(own, 1.0, np.subtract.outer(nodes, nodes))
     return np.asarray(np.where(own, 1.0, (at - nodes) / apart).prod(axis=1))
+
+
+def smooth_weights(nodes: Sequence[float], at: float) -> FloatArray:
+    """Weights (k,) of a curve through all nodes, smooth however many there are: the polynomial up to four, then a cubic spline.
+
+    The polynomial through the nearest few jumps where their choice changes, and a slope taken across a jump leads astray.
+    """
+    if len(nodes) <= 4:
+        return interpolation_weights(np.asarray(nodes), at)
+    order = np.argsort(nodes)
+    weights = np.empty(len(nodes))
+    weights[order] = _unit_spline(tuple(np.asarray(nodes)[order]))(at)
+    return weights
+
+
+@lru_cache(maxsize=256)
+def _unit_spline(nodes: tuple[float, ...]) -> CubicSpline:
+    return CubicSpline(nodes, np.eye(len(nodes)))
 
 
 def set_nominal_drop(
@@ -151,7 +171,7 @@ class RunGrid:
             self.runs[request.variant, request.index, request.cells, number] = runs[at : at + count]
             at += count
 
-    def stopped_runs(self, variant: str, index: int, cells: int | None, number: int) -> list[DropRun] | None:
+    def stopped_runs(self, variant: str, index: float, cells: int | None, number: int) -> list[DropRun] | None:
         """Runs of one family, in the order of its speeds, or None where one failed or never stopped."""
         runs = self.runs[variant, index, cells, number]
         good = [run for run in runs if isinstance(run, DropRun) and run.stopped]

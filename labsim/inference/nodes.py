@@ -37,6 +37,11 @@ def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -
     return [math.floor(place), math.ceil(place)]
 
 
+def own_node(log_p_m: float) -> float:
+    """The quarter of a strength node nearest to a value, for runs where an estimate lies."""
+    return round(4.0 * place_strength(log_p_m)) / 4.0
+
+
 def screening_node(log_p_m: float) -> int:
     """Every second strength node: what an effect does to ln D changes little within a factor of two of p_m, and campaigns
     whose nominal p_m an effect has driven off still share their fingerprints' runs."""

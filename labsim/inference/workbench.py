@@ -59,13 +59,13 @@ class Workbench:
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
     model: Model | None = None  # what the nominal model is extended by
     # what the tables hold already, and codes of the nominal model: encoding a run means seeing it through every scan
-    _filled: set[tuple[int, int, str, int | None]] = field(default_factory=set, repr=False)
-    _plain: dict[tuple[int, int, int | None], list[tuple[ResponseTable, FloatArray | None]]] = field(
+    _filled: set[tuple[int, float, str, int | None]] = field(default_factory=set, repr=False)
+    _plain: dict[tuple[int, float, int | None], list[tuple[ResponseTable, FloatArray | None]]] = field(
         default_factory=dict, repr=False
     )
 
     def _encode(
-        self, number: int, index: int, variant: str, cells: int | None
+        self, number: int, index: float, variant: str, cells: int | None
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
@@ -84,19 +84,19 @@ class Workbench:
         ]
 
     def _encode_plain(
-        self, number: int, index: int, cells: int | None
+        self, number: int, index: float, cells: int | None
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the nominal model, encoded once."""
         if (number, index, cells) not in self._plain:
             self._plain[number, index, cells] = self._encode(number, index, "", cells)
         return self._plain[number, index, cells]
 
-    def _fill_base(self, number: int, index: int) -> None:
+    def _fill_base(self, number: int, index: float) -> None:
         for table, codes in self._encode_plain(number, index, None):
             if codes is not None:
                 table.base[index] = codes
 
-    def _fill_change(self, number: int, index: int, name: str, amplitude: float, cells: int | None) -> None:
+    def _fill_change(self, number: int, index: float, name: str, amplitude: float, cells: int | None) -> None:
         variant = self._variant(name, amplitude)
         if (number, index, variant, cells) in self._filled:
             return
@@ -148,14 +148,14 @@ class Workbench:
     def _variant(self, name: str, amplitude: float) -> str:
         return f"{self.renamed.get(name, name)} {amplitude:.9g}"
 
-    def require_base(self, indices: Sequence[int]) -> None:
+    def require_base(self, indices: Sequence[float]) -> None:
         self.grid.require([Request("", None, index, None) for index in indices], "nominal model")
         for number in range(len(self.families)):
             for index in indices:
                 self._fill_base(number, index)
 
     def require_changes(
-        self, wanted: Sequence[tuple[str, float, int]], text: str = "effects", *, coarse: bool = False
+        self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, coarse: bool = False
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
         cells = COARSE_CELLS if coarse and self.grid.cells > COARSE_CELLS else None
