@@ -18,6 +18,7 @@ from ..inference.runs import Progress, RunStore
 from ..inference.workbench import Workbench
 from ..records import Campaign
 from .explore import explore, is_open
+from .free_law import FAILED, fit_hats
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Score, Screening, screen, screen_pairs
@@ -75,7 +76,9 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do."""
     lay_out_shapes(bench)
     screening = screen(bench, nominal, np.random.default_rng(seed))
-    unknown = fit_unknown(bench, nominal)
+    p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
+    tangents = fit_hats(bench, nominal) if p_value < FAILED else None
+    unknown = fit_unknown(bench, nominal, tangents)
     fits = confirm_singles(bench, nominal, screening)
     explored: dict[str, Fit] = {}
     if is_open(bench, nominal, fits, screening):
@@ -96,7 +99,6 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
         best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
-    p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
     return Judgement(bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, best)
 
 
