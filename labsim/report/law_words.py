@@ -68,14 +68,19 @@ def _say_place(law: RecoveredLaw) -> str:
 
 
 def clearest(law: RecoveredLaw) -> tuple[float, float, float]:
-    """Knot, value and standard deviation where the law stands out most."""
-    k = int(np.argmax(np.abs(law.mean) / law.sigma))
+    """Knot, value and standard deviation where the law is largest, of knots that the data reach and that exceed their error."""
+    low, high = law.law.reach
+    reached = np.array([low <= knot <= high for knot in law.law.knots])
+    size = np.abs(law.mean)
+    for chosen in (reached & (size > law.sigma), reached, np.ones_like(reached)):
+        if chosen.any():
+            k = int(np.argmax(np.where(chosen, size, -1.0)))
+            break
     return law.law.knots[k], float(law.mean[k]), float(law.sigma[k])
 
 
 def _clearness(law: RecoveredLaw) -> float:
-    _, value, sigma = clearest(law)
-    return abs(value) / sigma
+    return float(np.max(np.abs(law.mean) / law.sigma))
 
 
 def describe_unknown(found: Diagnosis) -> dict[str, Any]:
@@ -119,17 +124,21 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
     rows = []
     for k, law in enumerate(unknown.laws):
         points = ", ".join(
-            f"{knot:g}: {_show(law, value)} ± {_show(law, sigma)}"
+            f"{_show(law, value)} ± {_show(law, sigma)} at {knot:g}"
             for knot, value, sigma in zip(law.law.knots, law.mean, law.sigma, strict=True)
         )
         rows.append(
             {
                 "figure": f"law{k}",
-                "title": law.law.name[0].upper() + law.law.name[1:],
-                "text": f"{value_label(law)} at {place_label(law)} {points}. The band holds 68 %.",
+                "title": _begin(law.law.name),
+                "text": f"{_begin(value_label(law))} against {place_label(law)}: {points}. The band holds 68 %.",
             }
         )
     return {"words": words, "rows": rows}
+
+
+def _begin(words: str) -> str:
+    return words[0].upper() + words[1:]
 
 
 def _show(law: RecoveredLaw, value: float) -> str:

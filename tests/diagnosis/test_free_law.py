@@ -163,7 +163,7 @@ BEGIN, MIDDLE, END = (
     1.0,
     2.0,
 )  # tip radii: of a film that pushes back, which no effect of the catalogue does
-FORCE = 1.3e-4  # N, in its middle
+FORCE = 1.6e-4  # N, in its middle
 FILM = f'''"""A film in the dust pushes the projectile back while its tip is within it."""
 
 from labsim.effects import Parameter, Uniform
