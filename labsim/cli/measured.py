@@ -65,6 +65,7 @@ def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]
     from ..report import campaign_figures as figures
     from ..report.campaign_page import write_campaign_page
     from ..report.campaign_tables import campaign_diagnosis_lines, campaign_diagnosis_summary, extended_model
+    from ..report.law_figures import draw_laws
 
     probabilities = dict(found.verdict.probabilities)
     suggestions = suggest(found.bench, [found.nominal, *found.rivals], probabilities)
@@ -80,6 +81,9 @@ def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]
         posteriors.append((fits[1][0], found.posterior_extended))
     views, maps = _draw_fits(found, fits, folder)
     figures.draw_causes(found, folder / "causes.png")
+    (folder / "law.png").unlink(missing_ok=True)
+    if found.verdict.word == "unknown" and found.unknown.laws:
+        draw_laws(found.unknown.laws, folder / "law.png")
     figures.draw_held_out(found, [name for name, _ in fits], folder / "held_out.png")
     figures.draw_p_m(posteriors, folder / "posterior.png")
     figures.draw_posterior(found.posterior_extended, folder / "corner.png")

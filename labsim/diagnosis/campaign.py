@@ -19,6 +19,7 @@ from ..inference.runs import Progress, RunStore
 from ..inference.workbench import Workbench
 from ..records import Campaign
 from .explore import explore, is_open
+from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
 from .screen import Score, Screening, screen, screen_pairs
@@ -78,6 +79,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do."""
     lay_out_shapes(bench)
     screening = screen(bench, nominal, np.random.default_rng(seed))
+    p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
     unknown = fit_unknown(bench, nominal)
     fits = confirm_singles(bench, nominal, screening)
     explored: dict[str, Fit] = {}
@@ -87,6 +89,8 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     fits = settle_best(bench, fits)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
+    if is_wanted(p_value, rivals, unknown.evidence):
+        unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
     verdict = judge(
         nominal,
         rivals,
@@ -99,7 +103,6 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
         best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
-    p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
     return Judgement(bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, best)
 
 

@@ -56,7 +56,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
         for amplitude in amplitude_nodes(bench.effects[name], 0.0)
     ]
     bench.require_changes(wanted, "fingerprints", coarse=True)
-    names = [name for name in names if not bench.costs_runs(name) or _has_runs(bench, name)]
+    names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
     linear = with_probes(bench, fit, names)
     whitened = np.concatenate(
         [
@@ -109,7 +109,8 @@ def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str
     return sorted(found, key=lambda item: -item[1])
 
 
-def _has_runs(bench: Workbench, name: str) -> bool:
+def has_runs(bench: Workbench, name: str) -> bool:
+    """Whether an effect's runs gave every projectile something to compare."""
     tables = [*bench.tables, *(scan.table for scan in bench.scans)]
     return all(
         any(entry for entry in (table.changes.get(name) or table.fingerprints.get(name, {})).values())

@@ -1,13 +1,15 @@
 """The hypothesis that something is wrong which no listed cause explains: a smooth force law without a name.
 
 It competes with the causes on equal terms: residuals are a Gaussian process, orthogonal to nothing, whose size is
-integrated over a few values. What it finds is drawn as the shape of what is missing. What may deviate stands in FREEDOMS: a
-force law smooth over the way into the dust, speed and size; every drop by its own offset; the layering of undisturbed dust.
+integrated over a few values. What may deviate stands in FREEDOMS: a force law smooth over the way into the dust, speed and size;
+every drop by its own offset; the layering of undisturbed dust. Where the nominal model fails, laws that stand in the equations of
+motion compete too (EMBEDDED, free_law.py): what they find is drawn as the shape of what is missing.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +19,8 @@ from ..inference.fitting import Fit
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from ..records import FloatArray
+from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
+from .free_law import SIZES as LAW_SIZES
 
 SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth
 MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map, or the undisturbed dust, by 3 %
@@ -42,7 +46,11 @@ FREEDOMS = {
 
 @dataclass(frozen=True)
 class UnknownFit:
-    """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean per datum of the drops, m."""
+    """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean per datum of the drops, m.
+
+    evidences : of every freedom, over its sizes; laws : what the data say of the laws of the best freedom that stands in the
+    equations, ``embedded``; empty where none was tried.
+    """
 
     evidence: float
     block: str
@@ -50,15 +58,22 @@ class UnknownFit:
     law: FloatArray
     log_p_m: float
     log_p_m_sigma: float
+    evidences: dict[str, float]
+    embedded: str = ""
+    laws: tuple[RecoveredLaw, ...] = ()
 
 
-def fit_unknown(bench: Workbench, fit: Fit) -> UnknownFit:
-    """Evidence of the nominal model plus a free smooth law, at the nominal linearisation."""
+def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) -> UnknownFit:
+    """Evidence of the nominal model plus a free law, at the nominal linearisation.
+
+    tangents : of embedded laws, where those compete.
+    """
     linear = fit.linear
     coordinates = law_coordinates(fit)
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     n = sum(block.residual.size for block in linear.blocks)
-    terms, best = [], None
+    terms: dict[str, list[float]] = {}
+    best: tuple[float, str, float, FloatArray, float, float] | None = None
     for name, freedom in FREEDOMS.items():
         if freedom.in_dust and not linear.undisturbed:
             continue
@@ -70,15 +85,44 @@ def fit_unknown(bench: Workbench, fit: Fit) -> UnknownFit:
             step, information, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
             evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
             evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(information[0, 0]) - math.log(high - low)
-            terms.append(evidence)
+            terms.setdefault(name, []).append(evidence)
             if best is None or evidence > best[0]:
                 law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(linear.residual.size)
                 moved = fit.log_p_m + float(step[0])
                 best = (evidence, name, size, law, moved, math.sqrt(information[0, 0]))
+    embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
+    for name, places in EMBEDDED.items():
+        if tangents is None:
+            break
+        laws = [law for law in tangents.laws if law.name in places and law.knots]
+        hats = choose_hats(tangents, name)
+        if not hats:
+            continue
+        each = [integrate(tangents, hats, size, high - low) for size in LAW_SIZES]
+        terms[name] = [one.evidence for one in each]
+        embedded[name], mean = average(laws, each)
+        top = max(each, key=lambda one: one.evidence)
+        if best is None or top.evidence > best[0]:
+            size = LAW_SIZES[each.index(top)]
+            sigma = math.sqrt(top.covariance[0, 0])
+            best = (
+                top.evidence,
+                name,
+                size,
+                tangents.of_drops(hats) @ mean[1:],
+                tangents.log_p_m + float(mean[0]),
+                sigma,
+            )
     assert best is not None
-    top = max(terms)
-    total = top + math.log(sum(math.exp(term - top) for term in terms) / len(terms))
-    return UnknownFit(total, *best[1:])
+    evidences = {name: log_mean(values) for name, values in terms.items()}
+    nearest = max(embedded, key=lambda name: evidences[name], default="")
+    return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, embedded.get(nearest, ()))
+
+
+def log_mean(values: Collection[float]) -> float:
+    """ln of the mean of what these are the logarithms of."""
+    top = max(values)
+    return top + math.log(sum(math.exp(value - top) for value in values) / len(values))
 
 
 def loosen(block: Block, size: float) -> Block:

@@ -47,7 +47,9 @@ class ResponseTable:
             )
         across = interpolation_weights(self.log_speeds, log_speed)
         weights = smooth_weights(_log_strengths(self.base), log_p_m)
-        plain = sum(weight * (across @ codes) for codes, weight in zip(self.base.values(), weights, strict=True))
+        plain = sum(
+            weight * (across @ codes) for codes, weight in zip(self.base.values(), weights, strict=True)
+        )
         return Response(self, log_p_m, log_speed, across, np.asarray(plain))
 
 

@@ -171,7 +171,9 @@ class RunGrid:
             self.runs[request.variant, request.index, request.cells, number] = runs[at : at + count]
             at += count
 
-    def stopped_runs(self, variant: str, index: float, cells: int | None, number: int) -> list[DropRun] | None:
+    def stopped_runs(
+        self, variant: str, index: float, cells: int | None, number: int
+    ) -> list[DropRun] | None:
         """Runs of one family, in the order of its speeds, or None where one failed or never stopped."""
         runs = self.runs[variant, index, cells, number]
         good = [run for run in runs if isinstance(run, DropRun) and run.stopped]

@@ -12,11 +12,13 @@ from ..inference.calibrate import Calibration
 from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
-from .campaign_tables import say_missing, say_verdict
+from .campaign_tables import say_verdict
 from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
 from .cause_words import BADGES, describe_causes, describe_gain, list_confusable
 from .drop_views import DropView
 from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
+from .law_figures import plot_law
+from .law_words import describe_laws, size_of_missing
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
@@ -32,6 +34,7 @@ PICTURES = {
     "held_out": "Held-out drops: what each model misses of a drop that no fit has seen.",
     "posterior": "Posterior density of p_m.",
     "corner": "Posterior, every parameter against every other.",
+    "law": "The free law of an unknown cause with the band that holds 68 %, a panel a law.",
     "undisturbed": "Filling factor of undisturbed dust against depth.",
 }
 
@@ -65,8 +68,8 @@ def write_campaign_page(
         ),
     ]
     if found.verdict.word == "unknown":
-        if "depth" in say_missing(found):
-            tiles.append(("what is missing", f"≈ {100 * found.unknown.size:.0f} %", "of the depth"))
+        if size := size_of_missing(found):
+            tiles.append(("what is missing", *size))
     elif len(labels) > 1:
         percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
         extended = quantiles["extended"]
@@ -77,7 +80,9 @@ def write_campaign_page(
     if len(labels) > 1:
         held.append((labels[1], found.held_out_extended.rms))
     figures["held_out"] = plot_held_out(found.held_out_nominal.names, held, found.held_out_extended.expected)
-    causes = describe_causes(found, summary)
+    causes, laws = describe_causes(found, summary), describe_laws(found)
+    for row, law in zip(laws["rows"] if laws else [], found.unknown.laws, strict=False):
+        figures[row["figure"]] = plot_law(law)
     confusable = list_confusable(found)
     return _write(
         folder,
@@ -96,6 +101,7 @@ def write_campaign_page(
         ),
         diagnosed=True,
         causes=causes,
+        laws=laws,
         confusable=confusable,
         gain=describe_gain(found, summary, labels),
         suggestions=suggestions,

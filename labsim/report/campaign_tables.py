@@ -16,6 +16,7 @@ from ..inference.posterior import Posterior
 from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..sph import solver_hash
+from .law_words import describe_unknown, say_missing
 from .phrases import say_probability
 
 NUMERICAL_DEPTH = (
@@ -96,7 +97,10 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
                         "q95": float(np.clip(value + 1.645 * sigma, low, high)),
                     }
                 parameters[full] = {**entry, "unit": parameter.unit}
-        causes.append({"causes": list(hypothesis), "probability": probability, "parameters": parameters})
+        cause = {"causes": list(hypothesis), "probability": probability, "parameters": parameters}
+        if hypothesis == ("unknown",):
+            cause["free_law"] = describe_unknown(found)
+        causes.append(cause)
     gain = found.gain
     return {
         "format": 1,
@@ -140,21 +144,6 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
     }
 
 
-MISSING = {
-    "depth and speed": "a law of depth and speed, about {size} % of the depth",
-    "drop": "something that changes from drop to drop, about {size} % of the depth",
-    "undisturbed dust": "a layering of the dust that was there before the drop",
-    "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
-    "speed, about {size} % of the depth",
-}
-
-
-def say_missing(found: Diagnosis) -> str:
-    """What the unnamed law of the best fit depends on, and how large it is."""
-    block = found.unknown.block
-    return MISSING.get(block, f"a law of {block}").format(size=f"{100 * found.unknown.size:.0f}")
-
-
 def say_verdict(found: Diagnosis) -> str:
     """The verdict as one sentence that a laboratory can act on."""
     best, probability = found.verdict.probabilities[0]
@@ -168,7 +157,7 @@ def say_verdict(found: Diagnosis) -> str:
     if found.verdict.word == "unknown":
         return (
             f"The simulation is wrong in a way that no listed cause explains (probability {say_probability(probability)}): "
-            f"what is missing looks like {say_missing(found)}."
+            f"what is missing {say_missing(found)}."
         )
     parts = []
     for name in best:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
-from .campaign_tables import say_missing
+from .law_words import say_missing
 from .page import show_number
 from .phrases import SHOWN
 
@@ -44,7 +44,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
         )
     words = (
         "Posterior probabilities of every cause alone, of pairs where one is not enough, of the nominal model (none) and of a "
-        "smooth law without a name (unknown); together they are one."
+        "free law without a name (unknown); together they are one."
     )
     if found.verdict.word == "unknown":
         words += f" {_say_unknown(found)}"
@@ -55,7 +55,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
 def _say_unknown(found: Diagnosis) -> str:
     nearest = " + ".join(found.best.hypothesis) or "the nominal model"
     return (
-        f"What is missing looks like {say_missing(found)}; the nearest that the catalogue comes to it is {nearest}, drawn beside "
+        f"What is missing {say_missing(found)}; the nearest that the catalogue comes to it is {nearest}, drawn beside "
         "the nominal model."
     )
 

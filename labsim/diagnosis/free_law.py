@@ -1,0 +1,349 @@
+"""A free law where the equations have a place for it: in the strength of the dust and in the force on the projectile.
+
+    m d²z/dt² = m g - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
+
+h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. What every hat changes of drops
+and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian
+about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/diagnosis.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ..effects import Effect, Normal, Parameter
+from ..effects.contract import ChangeSetting
+from ..inference.blocks import Block
+from ..inference.fitting import Fit, goodness_of_fit, linearise_at
+from ..inference.likelihood import solve_globals, update_nuisances
+from ..inference.nodes import amplitude_nodes, enclosing_nodes, screening_node
+from ..inference.scans import update_speed
+from ..inference.workbench import Workbench
+from ..records import FloatArray
+from ..sph import DropSetting
+from .screen import has_runs
+
+FAILED = 0.01  # p value of the nominal model below which its runs are made: a campaign without a fault costs nothing more
+EXPLAINED = 0.05  # p value of the best listed cause above which they are not, if it also is
+AHEAD = 10.0  # so much, in ln evidence, before a law that has no place in the equations
+PRESSURE = 400.0  # Pa, what stops a drop of 0.65 m/s by the published 625 Pa s/m: the unit of the forces
+# of the unit. A law of 3 to 24 % all along the way moves depths by 1 to 8 %; one hat is a fourth of the way
+SIZES = (0.1, 0.2, 0.4, 0.8)
+STEP = 0.3  # of a hat when it is simulated
+FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
+# of what a law changes of the depth: error of a response known at one amplitude. A force of 320 Pa at one tip radius changes ln D
+# by 0.08 to 0.13 where runs at 120 Pa, in proportion, say 0.13 to 0.14
+ONE_AMPLITUDE = 0.15
+CLEAR = 3.0  # standard deviations from which a hat larger than its step is simulated about its estimate too
+MOST_BENT = 3  # such hats in a round
+ROUNDS = 2  # of Gauss and Newton about the law that is found
+COMPACTION = (
+    0.0,
+    0.03,
+    0.07,
+    0.13,
+)  # above φ0: half of what a tip compacts ends below 0.03, nine tenths below 0.07
+DEPTHS = (0.0, 0.5, 1.0, 2.0, 4.0)  # tip radii
+SPEEDS = (0.1, 0.3, 0.6, 1.2)  # m/s; nought at rest: a force that does not change with speed is one of depth
+
+EMBEDDED = {  # freedom -> the laws that are free together
+    "strength of filling factor": ("strength of filling factor",),
+    "force of depth": ("force of depth",),
+    "force of speed": ("force of speed",),
+    "strength and forces": ("strength of filling factor", "force of depth", "force of speed"),
+}
+
+Knots = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class FreeLaw:
+    """One place in the equations. grid : all knots; knots : those that hats stand at, the law is nought at the others; unit : of
+    the knots; reach : between what of them the data speak; scale : of a coefficient, in value_unit."""
+
+    name: str
+    over: str
+    unit: str
+    grid: tuple[float, ...]
+    knots: tuple[float, ...]
+    reach: tuple[float, float]
+    value_unit: str
+    scale: float
+
+    def hat(self, k: int) -> str:
+        return f"{self.name} at {self.knots[k]:g}"
+
+    @property
+    def hats(self) -> tuple[str, ...]:
+        return tuple(self.hat(k) for k in range(len(self.knots)))
+
+
+@dataclass(frozen=True)
+class RecoveredLaw:
+    """What the data say of one free law. mean : (k,) at its knots in value_unit; covariance : (k, k)."""
+
+    law: FreeLaw
+    mean: FloatArray
+    covariance: FloatArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        return np.sqrt(np.diag(self.covariance))
+
+    def at(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The law and its standard deviation: linear between knots, constant beyond."""
+        grid, knots = np.array(self.law.grid), np.array(self.law.knots)
+        weights = np.stack([np.interp(place, grid, (grid == knot).astype(float)) for knot in knots], axis=1)
+        return weights @ self.mean, np.sqrt(np.einsum("nk,kl,nl->n", weights, self.covariance, weights))
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """Whitened products of all data about a law. names : ln_p_m, then hats; gram : (2 + k, 2 + k) with the residual of no law
+    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude; log_p_m : there."""
+
+    laws: tuple[FreeLaw, ...]
+    names: tuple[str, ...]
+    gram: FloatArray
+    log_determinant: float
+    points: int
+    drops: FloatArray
+    log_p_m: float = 0.0
+
+    def of_drops(self, hats: Sequence[str]) -> FloatArray:
+        """Tangents (n, k) of these hats."""
+        return self.drops[:, [self.names.index(name) - 1 for name in hats]]
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """One size of some laws, integrated. coefficients : ln p_m first, then hats in the order asked, in units of their scales."""
+
+    evidence: float
+    coefficients: FloatArray
+    covariance: FloatArray
+
+
+def is_wanted(p_value: float, rivals: Sequence[Fit], without_place: float) -> bool:
+    """Whether a law in the equations can matter: the nominal model fails, and no listed cause both fits and stands far ahead of
+    ``without_place``, ln evidence of the laws that cost no runs."""
+    best = max(rivals, key=lambda fit: fit.evidence, default=None)
+    if p_value >= FAILED:
+        return False
+    return best is None or goodness_of_fit(best) < EXPLAINED or best.evidence < without_place + AHEAD
+
+
+def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
+    """The three laws with the hats that these drops and scans reach."""
+    deepest, fastest = 0.0, 0.0
+    for model in fit.models:
+        deepest = max(deepest, float(np.max(model.observed.depth)) / model.radius)
+        fastest = max(fastest, math.exp(model.instant.log_speed))
+    for scan, log_speed in zip(bench.scans, fit.scan_speeds, strict=True):
+        deepest = max(deepest, scan.observed.reduced.map.tip_depth / scan.observed.radius)
+        fastest = max(fastest, math.exp(log_speed))
+    material, level = bench.campaign.material, bench.campaign.sample.filling_factor
+    dust = tuple(round(level + more, 6) for more in COMPACTION if level + more < material.phi_2)
+    at_rest = (0.0, *SPEEDS)
+    return (
+        FreeLaw("strength of filling factor", "filling factor", "1", dust, dust, (dust[0], dust[-1]), "1", 1.0),
+        FreeLaw(
+            "force of depth", "depth", "tip radii", DEPTHS, _reached(DEPTHS, deepest), (0.0, deepest), "Pa", PRESSURE
+        ),
+        FreeLaw(
+            "force of speed", "speed", "m/s", at_rest, _reached(at_rest, fastest)[1:], (0.0, fastest), "Pa", PRESSURE
+        ),
+    )  # fmt: skip
+
+
+def _reached(knots: Sequence[float], most: float) -> tuple[float, ...]:
+    """Those whose hats begin before ``most``."""
+    return (knots[0], *(knot for before, knot in pairwise(knots) if before < most))
+
+
+def make_hats(law: FreeLaw, deepest: Mapping[DropSetting, float] | None = None) -> dict[str, Effect]:
+    """Every hat of a law as an effect with one amplitude, in the law's value_unit: null changes nothing, bit for bit.
+
+    deepest : depth (m) of drops without a law; a force that such a drop does not meet leaves its setting, so no run is made.
+    """
+    hats = {}
+    for name, knot in zip(law.hats, law.knots, strict=True):
+        unit = tuple((place, 1.0 if place == knot else 0.0) for place in law.grid)
+        step = STEP * law.scale
+        lowest = -0.9 if law.over == "filling factor" else -1e5
+        parameter = Parameter(
+            "amplitude", law.value_unit, 0.0, (lowest, 1e5), Normal(0.0, law.scale), step, "of one hat"
+        )
+        hats[name] = Effect(
+            name, name, "material", (parameter,), "", (), {}, Path(__file__), lambda campaign: "",
+            _add(law, unit, knot, deepest or {}), None, lambda campaign, parameter=parameter: (parameter,),
+        )  # fmt: skip
+    return hats
+
+
+def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, float]) -> ChangeSetting:
+    begins = max((place for place in law.grid if place < knot), default=-math.inf)
+
+    def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:
+        amplitude = values["amplitude"]
+        if amplitude == 0.0:
+            return setting
+        if law.over == "filling factor":
+            table = tuple((phi, 1.0 + amplitude * height) for phi, height in unit)
+            return setting.replace(strength_shape=combine(setting.strength_shape, table, product=True))
+        radius = setting.projectile.tip_radius
+        area = 2 * radius if setting.geometry == "planar" else math.pi * radius**2
+        reached = {"depth": deepest.get(setting, math.inf) / radius, "speed": FALLING * setting.impact_speed}
+        if reached[law.over] <= begins:
+            return setting
+        if law.over == "depth":
+            table = tuple((knot * radius, amplitude * area * height) for knot, height in unit)
+            return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+        table = tuple((knot, amplitude * area * height) for knot, height in unit)
+        return setting.replace(force_of_speed=combine(setting.force_of_speed, table))
+
+    return change
+
+
+def combine(before: Knots, table: Knots, *, product: bool = False) -> Knots:
+    """Sum of two laws linear between knots, or their product at the knots of both."""
+    if not before:
+        return table
+    places = sorted({x for x, _ in (*before, *table)})
+    first, second = (np.interp(places, *np.asarray(each).T) for each in (before, table))
+    return tuple(zip(places, (first * second if product else first + second).tolist(), strict=True))
+
+
+def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
+    """Runs of every hat by itself, then all data about the best law that they find; a hat whose runs fail is left out.
+
+    Logarithms of depth and time are what hats change, in proportion to their coefficients, large and clear ones along
+    further runs; p_m moves along its own.
+    """
+    laws = list_laws(bench, fit)
+    index = screening_node(fit.log_p_m)
+    bench.require_base([index])
+    deepest = {
+        run.setting: run.penetration_depth
+        for number in range(len(bench.families))
+        for run in bench.grid.stopped_runs("", index, None, number) or ()
+    }
+    hats = {name: hat for law in laws for name, hat in make_hats(law, deepest).items()}
+    # shares tables, runs and what they hold
+    terms = replace(bench.terms, numerical_change=ONE_AMPLITUDE)
+    free = replace(bench, effects={**bench.effects, **hats}, terms=terms)
+    # at every speed: what a force at some depth changes has a peak where drops end there
+    free.require_changes([(name, hat.amplitudes[0].step, index) for name, hat in hats.items()], "free law")
+    names = [name for name in hats if has_runs(bench, name)]
+    scales = {hat: law.scale for law in laws for hat in law.hats}
+    kept = tuple(
+        replace(law, knots=tuple(knot for knot, hat in zip(law.knots, law.hats, strict=True) if hat in names))
+        for law in laws
+    )
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    models, speeds, log_p_m = [replace(model) for model in fit.models], list(fit.scan_speeds), fit.log_p_m
+    values = dict.fromkeys(names, 0.0)
+    for rounds in range(ROUNDS + 1):
+        bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range))
+        linear = linearise_at(free, models, speeds, log_p_m, {**fit.values, **values})
+        gram, log_determinant, points = gather(linear.blocks, names, scales, values)
+        drops = np.stack([linear.tangents[name] * scales[name] for name in names], axis=1)
+        found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops, log_p_m)
+        if rounds == ROUNDS:
+            break
+        own, size = max(
+            ((choose_hats(found, freedom), size) for freedom in EMBEDDED for size in SIZES),
+            key=lambda each: integrate(found, *each, high - low).evidence,
+        )
+        priors = {name: (values[name], size * scales[name]) for name in own}
+        step, covariance, _, _, weighted = solve_globals(linear.blocks, ["ln_p_m", *own], priors)
+        log_p_m = float(np.clip(log_p_m + np.clip(step[0], -0.7, 0.7), low, high))
+        best = {name: values[name] + float(part) for name, part in zip(own, step[1:], strict=True)}
+        values = dict.fromkeys(names, 0.0) | best
+        sigma = np.sqrt(np.diag(covariance)[1:])
+        clear = {
+            name: abs(best[name]) / width
+            for name, width in zip(own, sigma, strict=True)
+            if abs(best[name]) > max(CLEAR * width, hats[name].amplitudes[0].step)
+        }
+        bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
+        nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], coarse=True)]
+        free.require_changes(nodes, "free law, large")
+        update_nuisances(models, linear, weighted[0])
+        for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
+            speeds[k], _ = update_speed(scan, speeds[k], block, weighted[1 + k])
+    return found
+
+
+def choose_hats(found: Tangents, freedom: str) -> list[str]:
+    """Hats of the laws that are free together."""
+    return [hat for law in found.laws if law.name in EMBEDDED[freedom] for hat in law.hats]
+
+
+def gather(
+    blocks: Sequence[Block],
+    names: Sequence[str],
+    scales: Mapping[str, float],
+    values: Mapping[str, float] | None = None,
+) -> tuple[FloatArray, float, int]:
+    """Gram matrix of whitened (residual, ln p_m, hats per unit coefficient), ln det C, number of data.
+
+    values : amplitudes that the blocks are linearised about; the residual is that of none, by the tangents there.
+    """
+    gram, log_determinant, points = np.zeros((2 + len(names),) * 2), 0.0, 0
+    for block in blocks:
+        residual = block.residual + sum(
+            block.tangents[name] * value for name, value in (values or {}).items()
+        )
+        columns = [residual, block.tangents["ln_p_m"], *(block.tangents[n] * scales[n] for n in names)]
+        white = block.whiten(np.stack(columns, axis=1))
+        gram += white.T @ white
+        log_determinant += block.log_determinant
+        points += block.residual.size
+    return gram, log_determinant, points
+
+
+def integrate(found: Tangents, hats: Sequence[str], size: float, log_range: float) -> Marginal:
+    """Evidence and posterior with Gaussian coefficients of this size and ln p_m flat over log_range.
+
+    The same as the covariance C + size² T Tᵀ over all data at once, by the matrix inversion lemma.
+    """
+    own = [found.names.index("ln_p_m"), *(found.names.index(name) for name in hats)]
+    places = np.array(own) + 1
+    information = found.gram[np.ix_(places, places)] + np.diag([0.0] + [size**-2] * len(hats))
+    factor = cho_factor(information, lower=True)
+    towards = found.gram[places, 0]
+    best = cho_solve(factor, towards)
+    chi_square = found.gram[0, 0] - towards @ best
+    log_information = 2 * float(np.sum(np.log(np.diag(factor[0]))))
+    evidence = -0.5 * (chi_square + found.log_determinant + (found.points - 1) * math.log(2 * math.pi))
+    evidence -= 0.5 * log_information + len(hats) * math.log(size) + math.log(log_range)
+    return Marginal(float(evidence), best, cho_solve(factor, np.eye(len(own))))
+
+
+def average(laws: Sequence[FreeLaw], each: Sequence[Marginal]) -> tuple[tuple[RecoveredLaw, ...], FloatArray]:
+    """Laws over the sizes by their evidence, and the mean (1 + k,) of the coefficients."""
+    top = max(one.evidence for one in each)
+    weights = np.exp([one.evidence - top for one in each])
+    weights /= weights.sum()
+    mean = np.sum([w * one.coefficients for w, one in zip(weights, each, strict=True)], axis=0)
+    covariance = np.sum(
+        [
+            w * (one.covariance + np.outer(one.coefficients - mean, one.coefficients - mean))
+            for w, one in zip(weights, each, strict=True)
+        ],
+        axis=0,
+    )
+    recovered, at = [], 1
+    for law in laws:
+        own = slice(at, at + len(law.knots))
+        at = own.stop
+        recovered.append(RecoveredLaw(law, mean[own] * law.scale, covariance[own, own] * law.scale**2))
+    return tuple(recovered), mean
