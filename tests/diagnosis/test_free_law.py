@@ -5,25 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
+from labsim.diagnosis import free_law
 from labsim.diagnosis.campaign import judge_campaign
-from labsim.diagnosis.free_law import (
-    DEPTHS,
-    EMBEDDED,
-    PRESSURE,
-    SPEEDS,
-    FreeLaw,
-    Tangents,
-    average,
-    combine,
-    gather,
-    integrate,
-    make_hats,
-)
+from labsim.diagnosis.free_law import EMBEDDED, Tangents, average, gather, integrate, is_wanted
+from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, combine, make_hats
 from labsim.diagnosis.unknown import FREEDOMS
 from labsim.effects import Place, list_effects
 from labsim.inference.blocks import Block
@@ -99,6 +90,24 @@ def test_a_law_over_sizes_is_as_wide_as_they_differ() -> None:
     variance += (1 - share) * each[0].covariance[1, 1] + share * each[1].covariance[1, 1]
     assert one.sigma[0] == pytest.approx(math.sqrt(variance))
     assert one.at(np.array([0.15, 0.165, 0.18]))[0] == pytest.approx(mean[1] * np.array([1.0, 0.5, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("p_value", "best", "wanted"),
+    [
+        (0.5, None, False),  # nothing is wrong
+        (0.001, None, True),
+        (0.001, (0.5, 40.0), False),  # a listed cause fits, far ahead
+        (0.001, (0.5, 25.0), True),  # fits, but hardly better than a law without a place
+        (0.001, (0.01, 40.0), True),  # best of those listed, and does not fit
+    ],
+)
+def test_runs_of_hats_are_made_only_where_they_can_matter(monkeypatch, p_value, best, wanted) -> None:
+    rivals = []
+    if best is not None:
+        monkeypatch.setattr(free_law, "goodness_of_fit", lambda fit: best[0])
+        rivals = [SimpleNamespace(evidence=best[1]), SimpleNamespace(evidence=0.0)]
+    assert is_wanted(p_value, rivals, 20.0) is wanted
 
 
 # ---------------------------------------------------------------- the hats

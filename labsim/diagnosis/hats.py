@@ -1,0 +1,137 @@
+"""Hats: the pieces that a law left free in the equations is made of, each a change of the setting like an effect's.
+
+They never stand in the catalogue. What fits them: free_law.py; equations: docs/diagnosis.md "The free law".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ..effects import Effect, Normal, Parameter
+from ..effects.contract import ChangeSetting
+from ..inference.fitting import Fit
+from ..inference.workbench import Workbench
+from ..sph import DropSetting
+
+PRESSURE = 400.0  # Pa, what stops a drop of 0.65 m/s by the published 625 Pa s/m: the unit of the forces
+STEP = 0.3  # of a hat when it is simulated
+FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
+COMPACTION = (
+    0.0,
+    0.03,
+    0.07,
+    0.13,
+)  # above φ0: half of what a tip compacts ends below 0.03, nine tenths below 0.07
+DEPTHS = (0.0, 0.5, 1.0, 2.0, 4.0)  # tip radii
+SPEEDS = (0.1, 0.3, 0.6, 1.2)  # m/s; nought at rest: a force that does not change with speed is one of depth
+
+Knots = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class FreeLaw:
+    """One place in the equations. grid : all knots; knots : those that hats stand at, the law is nought at the others; unit : of
+    the knots; reach : between what of them the data speak; scale : of a coefficient, in value_unit."""
+
+    name: str
+    over: str
+    unit: str
+    grid: tuple[float, ...]
+    knots: tuple[float, ...]
+    reach: tuple[float, float]
+    value_unit: str
+    scale: float
+
+    def hat(self, k: int) -> str:
+        return f"{self.name} at {self.knots[k]:g}"
+
+    @property
+    def hats(self) -> tuple[str, ...]:
+        return tuple(self.hat(k) for k in range(len(self.knots)))
+
+
+def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
+    """The three laws with the hats that these drops and scans reach."""
+    deepest, fastest = 0.0, 0.0
+    for model in fit.models:
+        deepest = max(deepest, float(np.max(model.observed.depth)) / model.radius)
+        fastest = max(fastest, math.exp(model.instant.log_speed))
+    for scan, log_speed in zip(bench.scans, fit.scan_speeds, strict=True):
+        deepest = max(deepest, scan.observed.reduced.map.tip_depth / scan.observed.radius)
+        fastest = max(fastest, math.exp(log_speed))
+    material, level = bench.campaign.material, bench.campaign.sample.filling_factor
+    dust = tuple(round(level + more, 6) for more in COMPACTION if level + more < material.phi_2)
+    at_rest = (0.0, *SPEEDS)
+    return (
+        FreeLaw("strength of filling factor", "filling factor", "1", dust, dust, (dust[0], dust[-1]), "1", 1.0),
+        FreeLaw(
+            "force of depth", "depth", "tip radii", DEPTHS, _reached(DEPTHS, deepest), (0.0, deepest), "Pa", PRESSURE
+        ),
+        FreeLaw(
+            "force of speed", "speed", "m/s", at_rest, _reached(at_rest, fastest)[1:], (0.0, fastest), "Pa", PRESSURE
+        ),
+    )  # fmt: skip
+
+
+def _reached(knots: Sequence[float], most: float) -> tuple[float, ...]:
+    """Those whose hats begin before ``most``."""
+    return (knots[0], *(knot for before, knot in pairwise(knots) if before < most))
+
+
+def make_hats(law: FreeLaw, deepest: Mapping[DropSetting, float] | None = None) -> dict[str, Effect]:
+    """Every hat of a law as an effect with one amplitude, in the law's value_unit: null changes nothing, bit for bit.
+
+    deepest : depth (m) of drops without a law; a force that such a drop does not meet leaves its setting, so no run is made.
+    """
+    hats = {}
+    for name, knot in zip(law.hats, law.knots, strict=True):
+        unit = tuple((place, 1.0 if place == knot else 0.0) for place in law.grid)
+        step = STEP * law.scale
+        lowest = -0.9 if law.over == "filling factor" else -1e5
+        parameter = Parameter(
+            "amplitude", law.value_unit, 0.0, (lowest, 1e5), Normal(0.0, law.scale), step, "of one hat"
+        )
+        hats[name] = Effect(
+            name, name, "material", (parameter,), "", (), {}, Path(__file__), lambda campaign: "",
+            _add(law, unit, knot, deepest or {}), None, lambda campaign, parameter=parameter: (parameter,),
+        )  # fmt: skip
+    return hats
+
+
+def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, float]) -> ChangeSetting:
+    begins = max((place for place in law.grid if place < knot), default=-math.inf)
+
+    def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:
+        amplitude = values["amplitude"]
+        if amplitude == 0.0:
+            return setting
+        if law.over == "filling factor":
+            table = tuple((phi, 1.0 + amplitude * height) for phi, height in unit)
+            return setting.replace(strength_shape=combine(setting.strength_shape, table, product=True))
+        radius = setting.projectile.tip_radius
+        area = 2 * radius if setting.geometry == "planar" else math.pi * radius**2
+        reached = {"depth": deepest.get(setting, math.inf) / radius, "speed": FALLING * setting.impact_speed}
+        if reached[law.over] <= begins:
+            return setting
+        if law.over == "depth":
+            table = tuple((knot * radius, amplitude * area * height) for knot, height in unit)
+            return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+        table = tuple((knot, amplitude * area * height) for knot, height in unit)
+        return setting.replace(force_of_speed=combine(setting.force_of_speed, table))
+
+    return change
+
+
+def combine(before: Knots, table: Knots, *, product: bool = False) -> Knots:
+    """Sum of two laws linear between knots, or their product at the knots of both."""
+    if not before:
+        return table
+    places = sorted({x for x, _ in (*before, *table)})
+    first, second = (np.interp(places, *np.asarray(each).T) for each in (before, table))
+    return tuple(zip(places, (first * second if product else first + second).tolist(), strict=True))
