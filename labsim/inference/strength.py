@@ -28,6 +28,7 @@ MOST_NODES = 5  # amplitudes simulated on one side of null
 HOPE = 1.5  # factor by which the strength at a limit may beat its projection
 LOWEST = 2.5  # times the least strength looked for that the smallest amplitude simulated may have
 SETTLED, ACCEPTED = 0.03, 0.1  # of a strength, off what is wanted: between runs, at a run
+WORTHLESS = 0.25  # the same, at which nothing is found: it does not follow its amplitude
 SIMULATED = 2  # amplitudes simulated for one strength
 STEPS = 4  # of the search between runs
 LEAST = 0.05  # standard deviations that logarithms are taken of
@@ -126,6 +127,8 @@ class StrengthCount:
                 strengths[amplitude] = self.simulate(effect, amplitude)
             if abs(strengths[amplitude] / sigma - 1) < ACCEPTED:
                 break
+        if abs(strengths[amplitude] / sigma - 1) > WORTHLESS:
+            return None
         return Found(hide(effect, amplitude), strengths[amplitude])
 
 

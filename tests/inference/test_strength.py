@@ -64,3 +64,21 @@ def test_the_amplitude_found_is_as_strong_as_wanted(count):
 def test_a_side_beyond_the_limits_is_left_out(count):
     search = count.find(count.truth.effect("side_friction"), -1, [4.0])
     assert search.found == {} and search.most == 0.0
+
+
+class Uneven(StrengthCount):
+    """Ten standard deviations per unit where runs are interpolated, five where they are made."""
+
+    def measure(self, hidden):
+        return 10.0 * hidden.effects["strength_rate"]["eta"]
+
+    def simulate(self, effect, amplitude):
+        return 5.0 * amplitude
+
+
+def test_what_does_not_follow_its_amplitude_is_not_found(count):
+    uneven = Uneven(count.campaign, count.store, count.truth)
+    effect = count.truth.effect("strength_rate")
+    assert uneven._search(effect, {0.2: 2.0, 0.8: 8.0}, 4.0) is None
+    uneven.simulate = lambda effect, amplitude: 10.0 * amplitude
+    assert uneven._search(effect, {0.2: 2.0, 0.8: 8.0}, 4.0).strength == pytest.approx(4.0, rel=0.1)
