@@ -9,8 +9,8 @@ import pytest
 
 from labsim.campaign import read_scan
 from labsim.ct import balance_mass, compress, count_voxels, reduce_scan
+from labsim.ct.grey import to_filling_factor
 from labsim.ct.phantom import Phantom
-from labsim.ct.reduce import to_filling_factor
 
 DATA = Path(__file__).parents[2] / "data" / "ct" / "labelled_scans"
 VOXEL = 37e-6
