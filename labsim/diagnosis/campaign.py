@@ -86,7 +86,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     if is_open(bench, nominal, fits, screening):
         explored = explore(bench, nominal, screening, fits)
         fits = confirm_explored(bench, nominal, fits, explored)
-    fits = settle_best(bench, fits)
+    fits = settle_best(bench, fits, unknown.evidence)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     rivals += confirm_pairs(bench, nominal, rivals, screening)
     if is_wanted(p_value, rivals, unknown.evidence):
@@ -204,12 +204,13 @@ def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: 
     return list(known.values())
 
 
-def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
+def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list[Fit]:
     """The fits with the best of those that are large made once more with runs at three strengths and amplitudes about them.
 
-    One or two lead there; what tells two large effects apart is how they bend with p_m.
+    One or two lead there; what tells two large effects apart is how they bend with p_m. Where a law without a name
+    (``without_place``, its ln evidence) is far ahead of all, none is worth the runs.
     """
-    top = max((fit.evidence for fit in fits), default=0.0)
+    least = max([without_place - CLOSE, *(fit.evidence - NARROW for fit in fits)])
     settled: list[Fit] = []
     again: set[str] = set()  # one variant of a cause
     for fit in sorted(fits, key=lambda fit: -fit.evidence):
@@ -218,7 +219,7 @@ def settle_best(bench: Workbench, fits: list[Fit]) -> list[Fit]:
         if (
             len(again) < MOST_SETTLED
             and cause(name) not in again
-            and fit.evidence > top - NARROW
+            and fit.evidence > least
             and bench.costs_runs(name)
             and effect.kind != "numerics"
             and abs(fit.values[name]) > LARGE * abs(effect.amplitudes[0].step)
