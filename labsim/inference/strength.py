@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import Effect
-from ..errors import ExtrapolationError, SimulationError
+from ..errors import LabsimError
 from ..records import Campaign
 from .calibrate import prepare
 from .runs import RunStore
@@ -88,7 +88,7 @@ class StrengthCount:
                 break
             try:
                 sigma = self.simulate(effect, amplitude)
-            except (SimulationError, ExtrapolationError):  # so much of it ends no run, or no fit
+            except LabsimError:  # so much of it ends no run, no track or no fit
                 end = f"runs or fits fail at {amplitude:.4g}"
                 break
             strengths[amplitude] = sigma
