@@ -19,7 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ..inference.blocks import Block
 from ..inference.fitting import Fit, goodness_of_fit, linearise_at
 from ..inference.likelihood import solve_globals, update_nuisances
-from ..inference.nodes import amplitude_nodes, enclosing_nodes, screening_node
+from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
 from ..inference.scans import update_speed
 from ..inference.workbench import Workbench
 from ..records import FloatArray
@@ -107,7 +107,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
     further runs; p_m moves along its own.
     """
     laws = list_laws(bench, fit)
-    index = screening_node(fit.log_p_m)
+    index = round(place_strength(fit.log_p_m))  # not screening's, which may lie where soft dust costs most
     bench.require_base([index])
     deepest = {
         run.setting: run.penetration_depth
