@@ -110,9 +110,7 @@ def fit_hypothesis(
     for k, name in enumerate(hypothesis, start=1):
         parameter = bench.effects[name].amplitudes[0]
         evidence += _share_inside(parameter, values[name], float(step[k]), math.sqrt(covariance[k, k]))
-        evidence += float(parameter.log_prior(parameter.null + values[name])) + bench.shape_evidence.get(
-            name, 0.0
-        )
+        evidence += _log_prior(parameter, values[name]) + bench.shape_evidence.get(name, 0.0)
     return Fit(
         hypothesis,
         log_p_m,
@@ -126,6 +124,12 @@ def fit_hypothesis(
         models,
         tuple(speeds),
     )
+
+
+def _log_prior(parameter: Parameter, amplitude: float) -> float:
+    """ln of the prior density; null plus an amplitude at a limit may round beyond it, where there is none."""
+    low, high = parameter.limits
+    return float(parameter.log_prior(min(max(parameter.null + amplitude, low), high)))
 
 
 def _share_inside(parameter: Parameter, amplitude: float, step: float, sigma: float) -> float:

@@ -159,7 +159,9 @@ def hide(effect: Effect, amplitude: float, shapes: Mapping[str, float] | None = 
     parameter = effect.amplitudes[0]
     values = {p.name: OFF_DEFAULT * p.null for p in effect.parameters if p.shape}
     low, high = parameter.limits
-    value = min(max(parameter.null + amplitude, low), high)  # null plus what is left to a limit may round beyond it
+    value = min(
+        max(parameter.null + amplitude, low), high
+    )  # null plus what is left to a limit may round beyond it
     return Hidden({effect.name: {parameter.name: value, **values, **(shapes or {})}})
 
 

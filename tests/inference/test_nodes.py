@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from labsim.effects import LogNormal, Parameter
+from labsim.inference.fitting import _log_prior
 from labsim.inference.grid import interpolation_weights, smooth_weights, strength_node
 from labsim.inference.nodes import own_node
 
@@ -39,3 +41,10 @@ def test_an_estimate_has_a_node_within_a_tenth_of_it():
     for p_m in (310.0, 794.0, 1000.0, 1300.0, 5200.0):
         assert strength_node(own_node(math.log(p_m))) == pytest.approx(p_m, rel=0.095)
     assert own_node(math.log(2000.0)) == 1.0
+
+
+def test_an_amplitude_at_a_limit_has_a_prior():
+    factor = Parameter("factor", "1", 1.0, (0.1, 6.0), LogNormal(1.0, 0.5), -0.25, "of a strength")
+    amplitude = 0.1 - 1.0
+    assert 1.0 + amplitude < 0.1  # by rounding
+    assert _log_prior(factor, amplitude) == float(factor.log_prior(0.1)) > -math.inf
