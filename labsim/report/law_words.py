@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ MISSING = {
     "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
     "speed, about {size} % of the depth",
 }
-CLEAR = 2.0  # standard deviations from which a law of several is named
+CLEAR = 2.0  # standard deviations from which a further law of several is named
 
 
 def is_embedded(found: Diagnosis) -> bool:
@@ -29,15 +30,15 @@ def say_missing(found: Diagnosis) -> str:
     unknown = found.unknown
     if not is_embedded(found):
         return "looks like " + MISSING[unknown.block].format(size=f"{100 * unknown.size:.0f}")
-    ranked = sorted(unknown.laws, key=lambda law: -_clearness(law))
-    named = [law for law in ranked if _clearness(law) > CLEAR] or ranked[:1]
-    return "acts like " + " and ".join(say_law(law) for law in named)
+    first, *rest = _rank(found)
+    parts = [f"a {law.law.name}" for law in rest if _clearness(law) > CLEAR]
+    return f"acts like {say_law(first)}" + (f" (with parts of {' and '.join(parts)})" if parts else "")
 
 
 def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
     """Value and unit for a tile: the clearest knot of an embedded law, or the share of the depth."""
     if is_embedded(found):
-        law = max(found.unknown.laws, key=_clearness)
+        law = _rank(found)[0]
         value, sigma = clearest(law)[1:]
         if law.law.over == "filling factor":
             return f"{100 * value:+.0f} ± {100 * sigma:.0f} %", f"of the strength {_say_place(law)}"
@@ -77,6 +78,12 @@ def clearest(law: RecoveredLaw) -> tuple[float, float, float]:
             k = int(np.argmax(np.where(chosen, size, -1.0)))
             break
     return law.law.knots[k], float(law.mean[k]), float(law.sigma[k])
+
+
+def _rank(found: Diagnosis) -> list[RecoveredLaw]:
+    """The laws of the best freedom, first the one that explains most by itself."""
+    alone = found.unknown.evidences
+    return sorted(found.unknown.laws, key=lambda law: -alone.get(law.law.name, -math.inf))
 
 
 def _clearness(law: RecoveredLaw) -> float:

@@ -1,0 +1,43 @@
+"""What is said of the law that an unknown cause would have to be."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from labsim.diagnosis.free_law import RecoveredLaw
+from labsim.diagnosis.hats import FreeLaw
+from labsim.report.law_words import say_missing, size_of_missing
+
+DEPTH = FreeLaw(
+    "force of depth", "depth", "tip radii", (0.0, 1.0, 2.0), (0.0, 1.0, 2.0), (0.0, 2.0), "Pa", 400.0
+)
+SPEED = FreeLaw("force of speed", "speed", "m/s", (0.0, 0.3, 1.2), (0.3, 1.2), (0.0, 1.0), "Pa", 400.0)
+
+
+def a_law(law: FreeLaw, mean: list[float], sigma: float) -> RecoveredLaw:
+    return RecoveredLaw(law, np.array(mean), sigma**2 * np.eye(len(mean)))
+
+
+@pytest.fixture
+def found():
+    """A force of depth explains most by itself; that of speed is the sharper one, and small."""
+    laws = (a_law(SPEED, [40.0, 10.0], 5.0), a_law(DEPTH, [-20.0, 205.0, 90.0], 30.0))
+    evidences = {"force of speed": 276.0, "force of depth": 1448.0, "strength and forces": 1526.0}
+    return SimpleNamespace(
+        unknown=SimpleNamespace(block="strength and forces", laws=laws, evidences=evidences, size=0.4)
+    )
+
+
+def test_the_law_that_explains_most_by_itself_comes_first(found):
+    assert say_missing(found) == (
+        "acts like a force on the tip of 205 ± 30 Pa of its cross-section upwards at a depth of 1 tip radius "
+        "(with parts of a force of speed)"
+    )
+    assert size_of_missing(found) == ("+205 ± 30 Pa", "on the tip at a depth of 1 tip radius")
+
+
+def test_what_is_not_clear_is_not_named_beside_it(found):
+    depth = found.unknown.laws[1]
+    found.unknown.laws = (a_law(SPEED, [5.0, 3.0], 5.0), depth)
+    assert say_missing(found).endswith("at a depth of 1 tip radius")
