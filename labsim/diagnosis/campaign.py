@@ -234,16 +234,17 @@ def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list
 def _settle(bench: Workbench, fit: Fit) -> Fit:
     """The fit among runs about it, then among runs at its own strength and amplitude too, until these move it no more."""
     name = fit.hypothesis[0]
-    fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
-    for _ in range(MOST_MOVED):
-        nodes = amplitude_nodes(bench.effects[name], fit.values[name], around=True)
-        nodes.append(float(f"{fit.values[name]:.2g}"))
-        index = own_node(fit.log_p_m)
-        bench.require_base([index])
-        bench.require_changes([(name, amplitude, index) for amplitude in nodes], name)
+    for turn in range(1 + MOST_MOVED):
+        if turn > 0:
+            nodes = amplitude_nodes(bench.effects[name], fit.values[name], around=True)
+            nodes.append(float(f"{fit.values[name]:.2g}"))
+            index = own_node(fit.log_p_m)
+            bench.require_base([index])
+            bench.require_changes([(name, amplitude, index) for amplitude in nodes], name)
         before = fit
         fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
-        if abs(fit.values[name] - before.values[name]) < MOVED * math.sqrt(before.covariance[1, 1]):
+        moved = abs(fit.values[name] - before.values[name])
+        if turn > 0 and moved < MOVED * math.sqrt(before.covariance[1, 1]):
             break
     return fit
 

@@ -17,10 +17,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..inference.blocks import Block
-from ..inference.fitting import Fit, goodness_of_fit, linearise_at
-from ..inference.likelihood import solve_globals, update_nuisances
+from ..inference.fitting import Fit, goodness_of_fit, linearise_at, move_nuisances
+from ..inference.likelihood import solve_globals
 from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
-from ..inference.scans import update_speed
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .hats import FreeLaw, list_laws, make_hats
@@ -155,9 +154,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
         nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], coarse=True)]
         free.require_changes(nodes, "free law, large")
-        update_nuisances(models, linear, weighted[0])
-        for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
-            speeds[k], _ = update_speed(scan, speeds[k], block, weighted[1 + k])
+        move_nuisances(bench, models, speeds, linear, weighted)
     return found
 
 

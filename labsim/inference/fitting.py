@@ -91,10 +91,7 @@ def fit_hypothesis(
             before = values[name]
             values[name] = _inside(bench, name, before + float(moved[k + 1]))
             change.append(abs(values[name] - before) / math.sqrt(covariance[k + 1, k + 1]))
-        shift = update_nuisances(models, linear, weighted[0])
-        for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
-            speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
-            shift = max(shift, 0.5 * moved_by)
+        shift = move_nuisances(bench, models, speeds, linear, weighted)
         if max(change) < SETTLED and shift < 0.05 and iteration > 0:
             break
     _ask(bench, hypothesis, log_p_m, values, coarse=coarse, around=around)
@@ -124,6 +121,24 @@ def fit_hypothesis(
         models,
         tuple(speeds),
     )
+
+
+def move_nuisances(
+    bench: Workbench,
+    models: list[DropModel],
+    speeds: list[float],
+    linear: Linearised,
+    weighted: Sequence[FloatArray],
+) -> float:
+    """Move the nuisances of drops, and speeds (ln) of scans, to their conditional best values; weighted : as solve_globals gives.
+
+    The largest move: in prior widths, contact time in units of a frame, speeds of scans in two of theirs.
+    """
+    shift = update_nuisances(models, linear, weighted[0])
+    for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
+        speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
+        shift = max(shift, 0.5 * moved_by)
+    return shift
 
 
 def _log_prior(parameter: Parameter, amplitude: float) -> float:

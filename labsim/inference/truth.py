@@ -20,7 +20,8 @@ from ..records import Campaign, FloatArray, Projectile, Scan
 from ..sph import DropRun, DropSetting
 from .curves import encode_run
 from .forward import ResponseTable
-from .grid import interpolation_weights, set_nominal_drop
+from .grid import set_nominal_drop
+from .nodes import place_strength
 from .observe import STANDARD_GRAVITY
 from .runs import Progress, RunStore
 from .scans import see_dust
@@ -28,6 +29,7 @@ from .scans import see_dust
 TRUTH_CELLS, TRUTH_SCAN_CELLS = 6, 10
 SPEED_ANCHOR, SPEED_RATIO = 0.13, 1.6
 STRENGTHS = (850.0, 1300.0, 2000.0)  # Pa, nodes of the truth
+PLACES = tuple(place_strength(math.log(p_m)) for p_m in STRENGTHS)  # among the strengths of tables
 CHANGED = (0, 2)  # of STRENGTHS, at which what effects change is simulated
 BEYOND = 1.02  # of the largest amplitude simulated
 DRIFT = "sample_drift"  # the effect that is a p_m of each drop
@@ -113,11 +115,13 @@ class TruthTable:
         ):
             for table, encode in family.tables if variant not in failed else ():
                 codes = np.array([encode(run) for run in part])
+                index = PLACES[k]
                 if variant == NOMINAL:
-                    table.base[k] = codes
+                    table.base[index] = codes
                 else:
                     name, amplitude = variant
-                    table.changes.setdefault(name, {}).setdefault(k, {})[amplitude] = codes - table.base[k]
+                    entry = table.changes.setdefault(name, {}).setdefault(index, {})
+                    entry[amplitude] = codes - table.base[index]
 
     def _list_families(self, blurs: Sequence[float]) -> list[Family]:
         """All that is simulated with one projectile, with the tables that it fills; those of scans for these blurs."""
@@ -164,24 +168,13 @@ class TruthTable:
     def _interpolate(
         self, table: ResponseTable, hidden: Hidden, log_p_m: float, log_speed: float
     ) -> FloatArray:
-        across = interpolation_weights(table.log_speeds, log_speed)
-        weights = interpolation_weights(np.log(STRENGTHS), log_p_m)
-        code = sum(w * (across @ table.base[k]) for k, w in enumerate(weights))
         name, amplitude = self._name(self._costly(hidden))
-        if name and amplitude != 0.0:
-            changes = table.changes.get(name, {})
-            known = [a for a in changes.get(CHANGED[0], {}) if a * amplitude > 0]
-            if not known or abs(amplitude) > BEYOND * max(map(abs, known)):
-                raise SimulationError(
-                    "simulation", "truth", f"{hidden.cause} has no runs that far; prepare it, or they failed"
-                )
-            near = sorted(known, key=lambda a: abs(a - amplitude))[:3]
-            shares = interpolation_weights(np.array([0.0, *near]), amplitude)[1:]
-            weights = interpolation_weights(np.log([STRENGTHS[k] for k in CHANGED]), log_p_m)
-            for k, weight in zip(CHANGED, weights, strict=True):
-                for a, share in zip(near, shares, strict=True):
-                    code = code + weight * share * (across @ changes[k][a])
-        return np.asarray(code)
+        known = [a for a in table.changes.get(name, {}).get(PLACES[CHANGED[0]], {}) if a * amplitude > 0]
+        if amplitude != 0.0 and (not known or abs(amplitude) > BEYOND * max(map(abs, known))):
+            raise SimulationError(
+                "simulation", "truth", f"{hidden.cause} has no runs that far; prepare it, or they failed"
+            )
+        return table.code(log_p_m, log_speed, {name: amplitude})
 
     def _name(self, effects: Effects) -> Variant:
         """What is simulated together, and its amplitude."""
@@ -254,8 +247,8 @@ class Family:
 
 def _lacks(table: ResponseTable, variant: Variant, k: int) -> bool:
     if variant == NOMINAL:
-        return k not in table.base
-    return variant[1] not in table.changes.get(variant[0], {}).get(k, {})
+        return PLACES[k] not in table.base
+    return variant[1] not in table.changes.get(variant[0], {}).get(PLACES[k], {})
 
 
 def _table(speeds: Sequence[float]) -> ResponseTable:
