@@ -21,7 +21,8 @@ import numpy as np
 import pandas as pd
 
 from labsim.campaign import read_campaign
-from labsim.diagnosis.campaign import CONFUSABLE, Diagnosis, diagnose_campaign
+from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
+from labsim.diagnosis.screen import CONFUSABLE
 from labsim.inference.runs import RunStore
 
 

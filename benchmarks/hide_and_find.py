@@ -31,8 +31,7 @@ from pathlib import Path
 import numpy as np
 from own_campaigns import MIDDLE, NOT_HIDDEN, SPREAD, judge_hidden, open_campaign
 
-from labsim.diagnosis.campaign import CONFUSABLE
-from labsim.diagnosis.screen import screen
+from labsim.diagnosis.screen import CONFUSABLE, screen
 from labsim.inference.calibrate import prepare
 from labsim.inference.runs import RunStore
 from labsim.inference.strength import Found, StrengthCount

@@ -30,7 +30,8 @@ from scipy.stats import beta
 
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
-from labsim.diagnosis.campaign import CONFUSABLE, judge_campaign
+from labsim.diagnosis.campaign import judge_campaign
+from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit

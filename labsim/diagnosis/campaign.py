@@ -22,7 +22,7 @@ from .explore import explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
-from .screen import Score, Screening, screen, screen_pairs
+from .screen import Score, Screening, list_confusable, screen, screen_pairs
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
@@ -40,7 +40,6 @@ MOVED = 0.5  # of its standard deviation, that asks for them once more
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
-CONFUSABLE = 0.9  # cosine of fingerprints
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
         fits = confirm_explored(bench, nominal, fits, explored)
     fits = settle_best(bench, fits, unknown.evidence)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
-    rivals += confirm_pairs(bench, nominal, rivals, screening)
+    rivals += confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
     if is_wanted(p_value, rivals, unknown.evidence):
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
     verdict = judge(
@@ -139,6 +138,11 @@ def diagnose_campaign(
     )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
+    if found.verdict.word == "unknown":
+        warnings.append(
+            f"p_m is not measured while the cause is unknown: {math.exp(nominal.log_p_m):.4g} Pa without, "
+            f"{math.exp(best.log_p_m):.4g} Pa with the nearest listed cause; neither's interval holds"
+        )
     low, high = campaign.p_m_range
     if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
         warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")
@@ -255,8 +259,13 @@ def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:
     return fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start}))
 
 
-def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening) -> list[Fit]:
-    """Pairs that the linear screening asks for: partners of the best singles, and those that only work together."""
+def confirm_pairs(
+    bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening, without_place: float
+) -> list[Fit]:
+    """Pairs that the linear screening asks for: partners of the best singles, and those that only work together.
+
+    None is worth its runs that does not come near ``without_place``, ln evidence of a law without a name.
+    """
     ranked = sorted(singles, key=lambda fit: -fit.evidence)
     starts: dict[Hypothesis, Fit] = {}
     for lead in ranked[:2]:
@@ -266,10 +275,11 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
         # finer runs of every partner would cost more than they say
         partners = [n for n, effect in bench.effects.items() if n != name and effect.kind != "numerics"]
         again = screen(bench, lead, np.random.default_rng(0), partners)
+        least = max(LEAST_GAIN, without_place - CLOSE - lead.evidence)
         for score in again.scores[:MOST_PAIRS]:
-            if score.log_bayes > LEAST_GAIN and (score.name, name) not in starts:
+            if score.log_bayes > least and (score.name, name) not in starts:
                 starts[name, score.name] = lead
-    top = ranked[0].evidence - nominal.evidence if ranked else 0.0
+    top = max([without_place - CLOSE, *(fit.evidence for fit in ranked[:1])]) - nominal.evidence
     joint = [
         (pair, log_bayes)
         for pair, log_bayes in screen_pairs(bench, screening)
@@ -285,14 +295,3 @@ def confirm_pairs(bench: Workbench, nominal: Fit, singles: list[Fit], screening:
         with suppress(ExtrapolationError):
             fits.append(fit_hypothesis(bench, pair, begin, nuisances=start))
     return fits
-
-
-def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:
-    """Pairs whose fingerprints are nearly parallel in this campaign, known before any data are looked at."""
-    found = []
-    for i, first in enumerate(screening.names):
-        for j in range(i + 1, len(screening.names)):
-            cosine = float(screening.cosines[i, j])
-            if abs(cosine) > CONFUSABLE:
-                found.append((first, screening.names[j], cosine))
-    return sorted(found, key=lambda item: -abs(item[2]))

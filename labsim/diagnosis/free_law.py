@@ -66,7 +66,7 @@ class RecoveredLaw:
 @dataclass(frozen=True)
 class Tangents:
     """Whitened products of all data about a law. names : ln_p_m, then hats; gram : (2 + k, 2 + k) with the residual of no law
-    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude; log_p_m : there."""
+    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude."""
 
     laws: tuple[FreeLaw, ...]
     names: tuple[str, ...]
@@ -74,7 +74,6 @@ class Tangents:
     log_determinant: float
     points: int
     drops: FloatArray
-    log_p_m: float = 0.0
 
     def of_drops(self, hats: Sequence[str]) -> FloatArray:
         """Tangents (n, k) of these hats."""
@@ -133,7 +132,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         linear = linearise_at(free, models, speeds, log_p_m, {**fit.values, **values})
         gram, log_determinant, points = gather(linear.blocks, names, scales, values)
         drops = np.stack([linear.tangents[name] * scales[name] for name in names], axis=1)
-        found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops, log_p_m)
+        found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops)
         if rounds == ROUNDS:
             break
         own, size = max(

@@ -18,6 +18,7 @@ from ..inference.workbench import Workbench
 from ..records import FloatArray
 
 DRAWS = 20_000
+CONFUSABLE = 0.9  # cosine of fingerprints
 
 
 @dataclass(frozen=True)
@@ -116,3 +117,14 @@ def has_runs(bench: Workbench, name: str) -> bool:
         any(entry for entry in (table.changes.get(name) or table.fingerprints.get(name, {})).values())
         for table in tables
     )
+
+
+def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:
+    """Pairs whose fingerprints are nearly parallel in this campaign, known before any data are looked at."""
+    found = []
+    for i, first in enumerate(screening.names):
+        for j in range(i + 1, len(screening.names)):
+            cosine = float(screening.cosines[i, j])
+            if abs(cosine) > CONFUSABLE:
+                found.append((first, screening.names[j], cosine))
+    return sorted(found, key=lambda item: -abs(item[2]))

@@ -56,8 +56,6 @@ class UnknownFit:
     block: str
     size: float
     law: FloatArray
-    log_p_m: float
-    log_p_m_sigma: float
     evidences: dict[str, float]
     embedded: str = ""
     laws: tuple[RecoveredLaw, ...] = ()
@@ -73,7 +71,7 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     n = sum(block.residual.size for block in linear.blocks)
     terms: dict[str, list[float]] = {}
-    best: tuple[float, str, float, FloatArray, float, float] | None = None
+    best: tuple[float, str, float, FloatArray] | None = None
     for name, freedom in FREEDOMS.items():
         if freedom.in_dust and not linear.undisturbed:
             continue
@@ -82,14 +80,13 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
             free = [loosen(Block(linear.residual, linear.covariance, linear.tangents, shape), size)]
             free += [loosen(block, MAP_SHARE * size * freedom.in_maps) for block in linear.scans]
             free += [loosen(block, MAP_SHARE * size * freedom.in_dust) for block in linear.undisturbed]
-            step, information, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
+            _, information, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
             evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
             evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(information[0, 0]) - math.log(high - low)
             terms.setdefault(name, []).append(evidence)
             if best is None or evidence > best[0]:
                 law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(linear.residual.size)
-                moved = fit.log_p_m + float(step[0])
-                best = (evidence, name, size, law, moved, math.sqrt(information[0, 0]))
+                best = (evidence, name, size, law)
     embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
     for name, places in EMBEDDED.items():
         if tangents is None:
@@ -103,15 +100,11 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
         embedded[name], mean = average(laws, each)
         top = max(each, key=lambda one: one.evidence)
         if best is None or top.evidence > best[0]:
-            size = LAW_SIZES[each.index(top)]
-            sigma = math.sqrt(top.covariance[0, 0])
             best = (
                 top.evidence,
                 name,
-                size,
+                LAW_SIZES[each.index(top)],
                 tangents.of_drops(hats) @ mean[1:],
-                tangents.log_p_m + float(mean[0]),
-                sigma,
             )
     assert best is not None
     evidences = {name: log_mean(values) for name, values in terms.items()}
