@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import truncnorm
 
 from ..inference.blocks import Block
-from ..inference.fitting import Fit, goodness_of_fit, linearise_at, move_nuisances
+from ..inference.fitting import Fit, goodness_of_fit, linearise_at, log_share_inside, move_nuisances
 from ..inference.likelihood import solve_globals
 from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
 from ..inference.workbench import Workbench
@@ -35,6 +36,7 @@ SIZES = (0.1, 0.2, 0.4, 0.8)
 ONE_AMPLITUDE = 0.15
 CLEAR = 3.0  # standard deviations from which a hat larger than its step is simulated about its estimate too
 MOST_BENT = 3  # such hats in a round
+ANYWHERE = (-1e3, 1e3)  # limits of ln p_m that are none
 ROUNDS = 2  # of Gauss and Newton about the law that is found
 EMBEDDED = {  # freedom -> the laws that are free together
     "strength of filling factor": ("strength of filling factor",),
@@ -66,7 +68,7 @@ class RecoveredLaw:
 @dataclass(frozen=True)
 class Tangents:
     """Whitened products of all data about a law. names : ln_p_m, then hats; gram : (2 + k, 2 + k) with the residual of no law
-    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude."""
+    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude; log_p_m : there."""
 
     laws: tuple[FreeLaw, ...]
     names: tuple[str, ...]
@@ -74,6 +76,7 @@ class Tangents:
     log_determinant: float
     points: int
     drops: FloatArray
+    log_p_m: float
 
     def of_drops(self, hats: Sequence[str]) -> FloatArray:
         """Tangents (n, k) of these hats."""
@@ -132,16 +135,18 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         linear = linearise_at(free, models, speeds, log_p_m, {**fit.values, **values})
         gram, log_determinant, points = gather(linear.blocks, names, scales, values)
         drops = np.stack([linear.tangents[name] * scales[name] for name in names], axis=1)
-        found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops)
+        found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops, log_p_m)
         if rounds == ROUNDS:
             break
         own, size = max(
             ((choose_hats(found, freedom), size) for freedom in EMBEDDED for size in SIZES),
-            key=lambda each: integrate(found, *each, high - low).evidence,
+            key=lambda each: integrate(found, *each, (low, high)).evidence,
         )
         priors = {name: (values[name], size * scales[name]) for name in own}
         step, covariance, _, _, weighted = solve_globals(linear.blocks, ["ln_p_m", *own], priors)
-        log_p_m = float(np.clip(log_p_m + np.clip(step[0], -0.7, 0.7), low, high))
+        before, log_p_m = log_p_m, float(np.clip(log_p_m + np.clip(step[0], -0.7, 0.7), low, high))
+        # the others' best where p_m stops short of its own
+        step += covariance[0] / covariance[0, 0] * (log_p_m - before - step[0])
         best = {name: values[name] + float(part) for name, part in zip(own, step[1:], strict=True)}
         values = dict.fromkeys(names, 0.0) | best
         sigma = np.sqrt(np.diag(covariance)[1:])
@@ -185,22 +190,31 @@ def gather(
     return gram, log_determinant, points
 
 
-def integrate(found: Tangents, hats: Sequence[str], size: float, log_range: float) -> Marginal:
-    """Evidence and posterior with Gaussian coefficients of this size and ln p_m flat over log_range.
+def integrate(
+    found: Tangents, hats: Sequence[str], size: float, limits: tuple[float, float] = ANYWHERE
+) -> Marginal:
+    """Evidence and posterior with Gaussian coefficients of this size and ln p_m flat between limits.
 
-    The same as the covariance C + size² T Tᵀ over all data at once, by the matrix inversion lemma.
+    Evidence without the limits is that of the covariance C + size² T Tᵀ over all data at once, by the matrix inversion lemma.
     """
     own = [found.names.index("ln_p_m"), *(found.names.index(name) for name in hats)]
     places = np.array(own) + 1
     information = found.gram[np.ix_(places, places)] + np.diag([0.0] + [size**-2] * len(hats))
     factor = cho_factor(information, lower=True)
     towards = found.gram[places, 0]
-    best = cho_solve(factor, towards)
+    best, covariance = cho_solve(factor, towards), cho_solve(factor, np.eye(len(own)))
     chi_square = found.gram[0, 0] - towards @ best
     log_information = 2 * float(np.sum(np.log(np.diag(factor[0]))))
     evidence = -0.5 * (chi_square + found.log_determinant + (found.points - 1) * math.log(2 * math.pi))
-    evidence -= 0.5 * log_information + len(hats) * math.log(size) + math.log(log_range)
-    return Marginal(float(evidence), best, cho_solve(factor, np.eye(len(own))))
+    evidence -= 0.5 * log_information + len(hats) * math.log(size) + math.log(limits[1] - limits[0])
+    low, high = (limit - found.log_p_m for limit in limits)
+    sigma = math.sqrt(covariance[0, 0])
+    evidence += log_share_inside(low, high, best[0], sigma)
+    # a Gaussian cut in its first coordinate: the others follow that one's mean and variance
+    cut = truncnorm((low - best[0]) / sigma, (high - best[0]) / sigma)
+    along = covariance[0] / sigma
+    best = best + along * cut.mean()
+    return Marginal(float(evidence), best, covariance + np.outer(along, along) * (cut.var() - 1.0))
 
 
 def average(laws: Sequence[FreeLaw], each: Sequence[Marginal]) -> tuple[tuple[RecoveredLaw, ...], FloatArray]:

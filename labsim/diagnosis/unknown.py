@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..inference.blocks import Block
-from ..inference.fitting import Fit
+from ..inference.fitting import Fit, log_share_inside
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from ..records import FloatArray
@@ -80,9 +80,11 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
             free = [loosen(Block(linear.residual, linear.covariance, linear.tangents, shape), size)]
             free += [loosen(block, MAP_SHARE * size * freedom.in_maps) for block in linear.scans]
             free += [loosen(block, MAP_SHARE * size * freedom.in_dust) for block in linear.undisturbed]
-            _, information, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
+            step, variance, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
             evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
-            evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(information[0, 0]) - math.log(high - low)
+            evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(variance[0, 0]) - math.log(high - low)
+            moved = fit.log_p_m + float(step[0])
+            evidence += log_share_inside(low, high, moved, math.sqrt(variance[0, 0]))
             terms.setdefault(name, []).append(evidence)
             if best is None or evidence > best[0]:
                 law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(linear.residual.size)
@@ -95,7 +97,7 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
         hats = choose_hats(tangents, name)
         if not hats:
             continue
-        each = [integrate(tangents, hats, size, high - low) for size in LAW_SIZES]
+        each = [integrate(tangents, hats, size, (low, high)) for size in LAW_SIZES]
         terms[name] = [one.evidence for one in each]
         embedded[name], mean = average(laws, each)
         top = max(each, key=lambda one: one.evidence)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import log_ndtr
 from scipy.stats import chi2
 
 from ..effects import Parameter
@@ -28,6 +28,7 @@ from .workbench import Workbench, find_family
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
 SETTLED = 0.02  # of a standard deviation
+MOST_CUT = 1.0 - 1e-12  # of a Gaussian, by two limits closer than rounding
 BEYOND = 0.7  # of ln p_m, how far outside its range an estimate may stray
 
 
@@ -104,9 +105,15 @@ def fit_hypothesis(
         log_likelihood + 0.5 * len(names) * math.log(2 * math.pi) + 0.5 * np.linalg.slogdet(covariance)[1]
     )
     evidence -= math.log(high - low)
-    for k, name in enumerate(hypothesis, start=1):
+    limits = [(low - log_p_m, high - log_p_m)]
+    for name in hypothesis:
         parameter = bench.effects[name].amplitudes[0]
-        evidence += _share_inside(parameter, values[name], float(step[k]), math.sqrt(covariance[k, k]))
+        limits.append(tuple(limit - parameter.null - values[name] for limit in parameter.limits))
+    for moved, sigma, between in zip(step, np.sqrt(np.diag(covariance)), limits, strict=True):
+        # Laplace's formula where a limit cuts the Gaussian, or its top, off
+        evidence += 0.5 * (moved / sigma) ** 2 + log_share_inside(*between, moved, sigma)
+    for name in hypothesis:
+        parameter = bench.effects[name].amplitudes[0]
         evidence += _log_prior(parameter, values[name]) + bench.shape_evidence.get(name, 0.0)
     return Fit(
         hypothesis,
@@ -147,11 +154,12 @@ def _log_prior(parameter: Parameter, amplitude: float) -> float:
     return float(parameter.log_prior(min(max(parameter.null + amplitude, low), high)))
 
 
-def _share_inside(parameter: Parameter, amplitude: float, step: float, sigma: float) -> float:
-    """ln of what Laplace's formula must be multiplied by where a limit of the parameter cuts the Gaussian, or its top, off."""
-    low, high = ((limit - parameter.null - amplitude - step) / sigma for limit in parameter.limits)
-    inside = float(ndtr(high) - ndtr(low))
-    return 0.5 * (step / sigma) ** 2 + math.log(max(inside, 1e-300))
+def log_share_inside(low: float, high: float, mean: float, sigma: float) -> float:
+    """ln of the share of a Gaussian between two limits: what is left of an integral that a flat prior ends at."""
+    below, above = (low - mean) / sigma, (high - mean) / sigma
+    if below > 0.0:  # the other tail, where shares do not round to 1
+        below, above = -above, -below
+    return float(log_ndtr(above) + math.log1p(-min(math.exp(log_ndtr(below) - log_ndtr(above)), MOST_CUT)))
 
 
 def goodness_of_fit(fit: Fit) -> float:

@@ -53,7 +53,7 @@ def test_the_integral_is_that_of_the_covariance(size: float) -> None:
     blocks = [a_block(rng, n, ["ln_p_m", *hats]) for n in (40, 25, 12)]
     gram, log_determinant, points = gather(blocks, hats, scales)
     found = integrate(
-        Tangents((), ("ln_p_m", *hats), gram, log_determinant, points, np.zeros((0, 3))), hats, size, 3.0
+        Tangents((), ("ln_p_m", *hats), gram, log_determinant, points, np.zeros((0, 3)), 0.0), hats, size
     )
     whole = np.zeros((77, 77))
     at = 0
@@ -68,11 +68,38 @@ def test_the_integral_is_that_of_the_covariance(size: float) -> None:
     joint = Block(np.concatenate([b.residual for b in blocks]), whole + size**2 * free @ free.T, tangents)
     step, covariance, chi, logdet, weighted = solve_globals([joint], ["ln_p_m"], {})
     evidence = -0.5 * (chi + logdet + points * math.log(2 * math.pi))
-    evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(covariance[0, 0]) - math.log(3.0)
+    evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(covariance[0, 0]) - math.log(2e3)
     assert found.evidence == pytest.approx(evidence, rel=1e-10, abs=1e-8)
     assert found.coefficients[0] == pytest.approx(step[0], rel=1e-8)
     assert found.covariance[0, 0] == pytest.approx(covariance[0, 0], rel=1e-8)
     assert found.coefficients[1:] == pytest.approx(size**2 * free.T @ weighted[0], rel=1e-8)
+
+
+@pytest.mark.parametrize("limits", [(6.8, 7.1), (8.0, 9.0)])
+def test_the_integral_ends_at_the_limits_of_p_m(limits: tuple[float, float]) -> None:
+    """Evidence and means, by sums over ln p_m of what the coefficients give there."""
+    rng = np.random.default_rng(11)
+    blocks = [a_block(rng, 30, ["ln_p_m", "a", "b"])]
+    gram, log_determinant, points = gather(blocks, ["a", "b"], {"a": 1.0, "b": 1.0})
+    tangents = Tangents(
+        (), ("ln_p_m", "a", "b"), gram, log_determinant, points, np.zeros((0, 2)), log_p_m=7.0
+    )
+    cut, whole = integrate(tangents, ["a", "b"], 0.5, limits), integrate(tangents, ["a", "b"], 0.5)
+    log_p_m = np.linspace(*limits, 4001) - 7.0
+    sigma = math.sqrt(whole.covariance[0, 0])
+    density = np.exp(-0.5 * ((log_p_m - whole.coefficients[0]) / sigma) ** 2) / sigma / math.sqrt(2 * math.pi)
+    share = np.trapezoid(density, log_p_m)
+    flat = math.log(2e3) - math.log(limits[1] - limits[0])
+    assert cut.evidence == pytest.approx(whole.evidence + flat + math.log(share), abs=1e-5)
+    mean = np.trapezoid(density * log_p_m, log_p_m) / share
+    assert cut.coefficients[0] == pytest.approx(mean, rel=1e-5)
+    slope = whole.covariance[1:, 0] / whole.covariance[0, 0]
+    assert cut.coefficients[1:] == pytest.approx(
+        whole.coefficients[1:] + slope * (mean - whole.coefficients[0]), rel=1e-5
+    )
+    variance = np.trapezoid(density * (log_p_m - mean) ** 2, log_p_m) / share
+    spread = whole.covariance[1:, 1:] - np.outer(slope, slope) * (whole.covariance[0, 0] - variance)
+    assert cut.covariance[1:, 1:] == pytest.approx(spread, rel=1e-4)
 
 
 def test_a_law_over_sizes_is_as_wide_as_they_differ() -> None:
@@ -80,8 +107,8 @@ def test_a_law_over_sizes_is_as_wide_as_they_differ() -> None:
     law = replace(LAWS[0], knots=DUST[:1])
     name = law.hats[0]
     gram, log_determinant, points = gather([a_block(rng, 30, ["ln_p_m", name])], [name], {name: 1.0})
-    found = Tangents((law,), ("ln_p_m", name), gram, log_determinant, points, np.zeros((0, 1)))
-    each = [integrate(found, [name], size, 1.0) for size in (0.01, 1.0)]
+    found = Tangents((law,), ("ln_p_m", name), gram, log_determinant, points, np.zeros((0, 1)), 0.0)
+    each = [integrate(found, [name], size) for size in (0.01, 1.0)]
     (one,), mean = average([law], each)
     share = 1 / (1 + math.exp(each[0].evidence - each[1].evidence))
     values = [one.coefficients[1] for one in each]

@@ -5,8 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
 
 from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
+from labsim.inference.fitting import log_share_inside
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.likelihood import solve_globals
@@ -28,6 +31,26 @@ def test_weights_sum_to_one_and_reproduce_polynomials():
     weights = interpolation_weights(nodes, math.log(0.2))
     assert weights.sum() == pytest.approx(1.0, abs=1e-12)
     assert weights @ nodes**3 == pytest.approx(math.log(0.2) ** 3, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "mean", "sigma"),
+    [
+        (5.7, 8.7, 7.0, 0.1),
+        (5.7, 8.7, 5.6, 0.2),
+        (5.7, 8.7, 9.0, 0.1),
+        (0.0, 1e-3, 0.5, 1.0),
+        (-math.inf, 0.3, 1.0, 0.5),
+    ],
+)
+def test_the_share_of_a_gaussian_between_limits(low, high, mean, sigma):
+    inside, _ = quad(norm(mean, sigma).pdf, max(low, mean - 40 * sigma), high, epsabs=0.0, limit=200)
+    assert log_share_inside(low, high, mean, sigma) == pytest.approx(math.log(inside), rel=1e-7, abs=1e-9)
+
+
+def test_the_share_far_outside_is_the_tail():
+    assert log_share_inside(30.0, 60.0, 0.0, 1.0) == pytest.approx(norm.logsf(30.0))
+    assert log_share_inside(-600.0, -300.0, 0.0, 10.0) == pytest.approx(norm.logcdf(-30.0))
 
 
 def test_speed_nodes_enclose_and_are_shared():
