@@ -27,6 +27,7 @@ from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
+HALF = 0.5  # of the best, if that is more: a large effect is twice what the screening makes of it, or half
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
@@ -178,13 +179,13 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
         score
         for score in screening.scores
         if bench.costs_runs(score.name)
-        and score.log_bayes > max(top - CLOSE, WORTHWHILE)
+        and score.log_bayes > max(min(top - CLOSE, HALF * top), WORTHWHILE)
         # finer runs for a suspicion of coarseness only where nothing else explains as much
         and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
     for score in costly:
         variants = sum(cause(fit.hypothesis[0]) == cause(score.name) for fit in fits)
-        if score.log_bayes < top - CLOSE or variants >= MOST_VARIANTS:  # far behind what was simulated since
+        if score.log_bayes < min(top - CLOSE, HALF * top) or variants >= MOST_VARIANTS:  # far behind by now
             continue
         with suppress(ExtrapolationError):  # its runs lead nowhere: no candidate
             fits.append(_fit_from_score(bench, nominal, score))

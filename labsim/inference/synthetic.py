@@ -104,17 +104,20 @@ def _scan(
 ) -> ReducedScan:
     """The map of one bead of this truth: its speed, sample, lift and noise drawn anew, in the frame of the template's bead.
 
-    The dust keeps its place about the tip, which the template's frame follows: the lift moves what the map says of the depth.
+    The dust keeps its place about the tip, which the template's frame follows: the lift moves what the map says of the depth. A
+    wider point spread is measured at the bead's edge as it is.
     """
     scan, place = template.scan, list_places(truth.campaign)[template.scan.name]
+    instrument = truth.instrument(hidden, place)
     speed = scan.speed.value + laboratory.scan_speeds * scan.speed.sigma * rng.standard_normal()
     log_p_m = math.log(hidden.p_m) + laboratory.samples * rng.standard_normal()
     code = truth.map_code(hidden, scan, log_p_m, math.log(speed))
     tip = math.exp(code[0]) - laboratory.lift * rng.exponential()
     frame = replace(template.map, z=template.map.z - (tip - template.map.tip_depth), tip_depth=tip)
-    seen = code[1:].reshape(frame.filling_factor.shape) * truth.instrument(hidden, place).ct_scale
+    seen = code[1:].reshape(frame.filling_factor.shape) * instrument.ct_scale
     noise = laboratory.maps * np.nan_to_num(frame.sigma) * rng.standard_normal(seen.shape)
-    return replace(template, map=replace(frame, filling_factor=seen + noise))
+    blur = math.hypot(template.point_spread, instrument.ct_blur)
+    return replace(template, map=replace(frame, filling_factor=seen + noise), blur=blur)
 
 
 def _film(

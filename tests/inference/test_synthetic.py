@@ -1,15 +1,18 @@
 """Two hidden effects at once: both are in what was filmed, and only what costs runs is simulated."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from labsim.campaign import read_campaign
+from labsim.campaign import read_campaign, read_scan
+from labsim.ct.reduce import reduce_scan
 from labsim.errors import SimulationError
 from labsim.inference.curves import encode_run
-from labsim.inference.synthetic import measure_hidden
+from labsim.inference.scans import see_dust
+from labsim.inference.synthetic import QUIET, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.sph import simulate
 
@@ -81,3 +84,25 @@ def test_what_was_not_simulated_is_between_what_was(truth):
     assert np.array_equal(kept.code(Hidden(FRICTION), projectile, *place), rough)
     with pytest.raises(SimulationError):
         truth.holding(Hidden(PIXELS)).code(Hidden(FRICTION), projectile, *place)
+
+
+def test_a_blurred_map_says_how_wide_its_point_spread_is():
+    """Without noise, the run that a truth is made of leaves nothing of its map: seen through the point spread the map states."""
+    labelled = CAMPAIGN.parents[1] / "ct" / "labelled_scans" / "p01-C01"
+    campaign = read_campaign(CAMPAIGN)
+    scan = replace(read_scan(labelled), name="C01")
+    template = reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor)
+    runs = TwoRuns()
+    table = TruthTable(
+        replace(campaign, drops=campaign.drops[:1], scans=(scan,)), runs, templates=(template,)
+    )
+    hidden = Hidden({"ct_blur": {"sigma": 1.5e-4}})
+    table.prepare([Hidden(), hidden])
+    for truth, spread in (
+        (Hidden(), template.point_spread),
+        (hidden, math.hypot(template.point_spread, 1.5e-4)),
+    ):
+        (found,) = measure_hidden(table, truth, np.random.default_rng(2), laboratory=QUIET).reduced
+        assert found.point_spread == pytest.approx(spread)
+        seen = see_dust(runs.runs[0.0], found.map, found.point_spread)
+        assert seen[found.usable] == pytest.approx(found.map.filling_factor[found.usable], abs=1e-12)
