@@ -18,7 +18,7 @@ from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.workbench import Workbench
 from ..records import Campaign
-from .explore import explore, is_open
+from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
@@ -27,7 +27,7 @@ from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
-HALF = 0.5  # of the best, if that is more: a large effect is twice what the screening makes of it, or half
+HALF = 0.5  # of the best, if that is more, where nothing explores further: large effects are not what the screening says
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
@@ -175,17 +175,22 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
     free = [score for score in screening.scores if not bench.costs_runs(score.name)]
     fits = [_fit_from_score(bench, nominal, score) for score in free]
     top = max([screening.scores[0].log_bayes, *(fit.evidence - nominal.evidence for fit in fits)])
+
+    def least(score: Score) -> float:
+        explored = bench.effects[score.name].kind in EXPLORED
+        return top - CLOSE if explored else min(top - CLOSE, HALF * top)
+
     costly = [
         score
         for score in screening.scores
         if bench.costs_runs(score.name)
-        and score.log_bayes > max(min(top - CLOSE, HALF * top), WORTHWHILE)
+        and score.log_bayes > max(least(score), WORTHWHILE)
         # finer runs for a suspicion of coarseness only where nothing else explains as much
         and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
     for score in costly:
         variants = sum(cause(fit.hypothesis[0]) == cause(score.name) for fit in fits)
-        if score.log_bayes < min(top - CLOSE, HALF * top) or variants >= MOST_VARIANTS:  # far behind by now
+        if score.log_bayes < least(score) or variants >= MOST_VARIANTS:  # far behind by now
             continue
         with suppress(ExtrapolationError):  # its runs lead nowhere: no candidate
             fits.append(_fit_from_score(bench, nominal, score))

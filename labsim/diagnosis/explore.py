@@ -20,7 +20,7 @@ from .screen import Screening
 from .shapes import cause
 
 REACH = 2.5  # factor on p_m
-KINDS = ("material", "contact")  # that p_m can make up for; samples are seen in the scans
+EXPLORED = ("material", "contact")  # kinds that p_m can make up for; samples are seen in the scans
 FAILED = 0.05  # p value of the nominal model below which it is worth while
 EXPLAINED = 0.01  # p value of a fit above which nothing more is looked for
 PROMISING = 3.0  # ln Bayes factor of the screening from which it is
@@ -39,7 +39,7 @@ def is_open(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Scre
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
     if found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < EXPLAINED:
         return True
-    return bench.effects[found.hypothesis[0]].kind in KINDS
+    return bench.effects[found.hypothesis[0]].kind in EXPLORED
 
 
 def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence[Fit]) -> dict[str, Fit]:
@@ -56,7 +56,7 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
     top = max([nominal.evidence, *(fit.evidence for fit in fits)])
     for score in screening.scores:
         name = score.name
-        if not bench.costs_runs(name) or bench.effects[name].kind not in KINDS or cause(name) != name:
+        if not bench.costs_runs(name) or bench.effects[name].kind not in EXPLORED or cause(name) != name:
             continue
         for start in starts:
             try:
