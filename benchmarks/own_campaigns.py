@@ -88,7 +88,8 @@ def judge_hidden(
         for name in hidden.effects
         if name in names
     }
-    sigma = math.sqrt(found.best.covariance[0, 0])
+    moved, width = found.best.over_shapes
+    sigma = math.hypot(math.sqrt(found.best.covariance[0, 0]), width)
     value = next((value for values in hidden.effects.values() for value in values.values()), math.nan)
     first = found.verdict.probabilities[0]
     return {
@@ -98,7 +99,7 @@ def judge_hidden(
         "counted": counted,
         "seed": seed,
         "p_m": hidden.p_m,
-        "log_p_m": found.best.log_p_m,
+        "log_p_m": found.best.log_p_m + moved,
         "log_p_m_sigma": sigma,
         "value": value,
         "found": {
