@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ExtrapolationError
 from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
-from ..inference.fitting import Fit, Hypothesis, fit_hypothesis, goodness_of_fit
+from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
 from ..inference.nodes import amplitude_nodes, own_node
 from ..inference.posterior import Posterior
@@ -22,11 +22,11 @@ from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
-from .screen import Score, Screening, list_confusable, screen, screen_pairs
+from .pairs import confirm_pairs, return_to_singles
+from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
-CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 HALF = 0.5  # of the best, if that is more, where nothing explores further: large effects are not what the screening says
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
@@ -38,9 +38,6 @@ MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes ab
 LARGE = 0.5  # of an effect's step
 MOST_MOVED = 2  # times that runs are made at the strength and amplitude itself
 MOVED = 0.5  # of its standard deviation, that asks for them once more
-MOST_PAIRS = 3  # partners of one single
-MOST_JOINT = 2  # pairs taken from the linear screening alone
-LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,8 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
         fits = confirm_explored(bench, nominal, fits, explored)
     fits = settle_best(bench, fits, unknown.evidence)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
-    rivals += confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
+    pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
+    rivals = return_to_singles(bench, rivals, pairs) + pairs
     if is_wanted(p_value, rivals, unknown.evidence):
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
     verdict = judge(
@@ -263,41 +261,3 @@ def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:
     reach = 2 * abs(bench.effects[score.name].amplitudes[0].step)
     start = float(np.clip(score.amplitude, -reach, reach))
     return fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start}))
-
-
-def confirm_pairs(
-    bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening, without_place: float
-) -> list[Fit]:
-    """Pairs that the linear screening asks for: partners of the best singles, and those that only work together.
-
-    None is worth its runs that does not come near ``without_place``, ln evidence of a law without a name.
-    """
-    ranked = sorted(singles, key=lambda fit: -fit.evidence)
-    starts: dict[Hypothesis, Fit] = {}
-    for lead in ranked[:2]:
-        if lead.evidence < max(nominal.evidence, ranked[0].evidence - CLOSE) + LEAST_GAIN:
-            continue
-        name = lead.hypothesis[0]
-        # finer runs of every partner would cost more than they say
-        partners = [n for n, effect in bench.effects.items() if n != name and effect.kind != "numerics"]
-        again = screen(bench, lead, np.random.default_rng(0), partners)
-        least = max(LEAST_GAIN, without_place - CLOSE - lead.evidence)
-        for score in again.scores[:MOST_PAIRS]:
-            if score.log_bayes > least and (score.name, name) not in starts:
-                starts[name, score.name] = lead
-    top = max([without_place - CLOSE, *(fit.evidence for fit in ranked[:1])]) - nominal.evidence
-    joint = [
-        (pair, log_bayes)
-        for pair, log_bayes in screen_pairs(bench, screening)
-        if not any(bench.effects[name].kind == "numerics" for name in pair)
-    ]
-    for pair, log_bayes in joint[:MOST_JOINT]:
-        known = any(set(pair) == set(other) for other in starts)
-        if not known and log_bayes > max(top, 0.0) + LEAST_GAIN:
-            starts[pair] = nominal
-    fits = []
-    for pair, start in starts.items():
-        begin = (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair})
-        with suppress(ExtrapolationError):
-            fits.append(fit_hypothesis(bench, pair, begin, nuisances=start))
-    return fits

@@ -1,8 +1,8 @@
 """Large effects: what a tangent at the nominal fit cannot see because p_m has run away to make up for it.
 
 Where the nominal model fails, every effect that costs runs is fitted by Gauss-Newton on fingerprints (coarse runs), from the
-nominal p_m and from strengths a factor REACH above and below it, the effect's amplitude taken first at that strength. The
-best of the three replaces the tangent's word.
+nominal p_m, or the end of its range, and from strengths a factor REACH above and below it, the effect's amplitude taken first
+at that strength. The best of the three replaces the tangent's word.
 """
 
 from __future__ import annotations
@@ -48,10 +48,11 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
     fits : found so far.
     """
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    starts = [nominal.log_p_m]
+    middle = min(max(nominal.log_p_m, low), high)  # an effect may have driven it out of its range
+    starts = [middle]
     for shift in (math.log(REACH), -math.log(REACH)):
-        if low <= nominal.log_p_m + shift <= high:
-            starts.append(nominal.log_p_m + shift)
+        if low <= middle + shift <= high:
+            starts.append(middle + shift)
     found: dict[str, Fit] = {}
     top = max([nominal.evidence, *(fit.evidence for fit in fits)])
     for score in screening.scores:

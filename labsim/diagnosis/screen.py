@@ -19,6 +19,7 @@ from ..records import FloatArray
 
 DRAWS = 20_000
 CONFUSABLE = 0.9  # cosine of fingerprints
+CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,10 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from labsim.diagnosis import campaign
+from labsim.diagnosis import pairs
 from labsim.diagnosis.screen import Score
 
 
@@ -12,12 +13,12 @@ def confirm(monkeypatch: pytest.MonkeyPatch, without_place: float, partner: floa
     """Hypotheses asked for: a single 50 above the nominal model, a partner and a pair that promise so much (ln Bayes factors)."""
     asked = []
     monkeypatch.setattr(
-        campaign,
+        pairs,
         "screen",
         lambda *_: SimpleNamespace(scores=[Score("pore_gas", 1.0, 1.0, 1.0, partner)]),
     )
-    monkeypatch.setattr(campaign, "screen_pairs", lambda *_: [(("surface_crust", "pixel_scale"), joint)])
-    monkeypatch.setattr(campaign, "fit_hypothesis", lambda bench, pair, *_, **__: asked.append(pair) or pair)
+    monkeypatch.setattr(pairs, "screen_pairs", lambda *_: [(("surface_crust", "pixel_scale"), joint)])
+    monkeypatch.setattr(pairs, "fit_hypothesis", lambda bench, pair, *_, **__: asked.append(pair) or pair)
     bench = SimpleNamespace(
         effects={
             name: SimpleNamespace(kind="material")
@@ -28,7 +29,7 @@ def confirm(monkeypatch: pytest.MonkeyPatch, without_place: float, partner: floa
     lead = SimpleNamespace(
         evidence=150.0, hypothesis=("shear_strength",), log_p_m=7.0, values={"shear_strength": 0.1}
     )
-    campaign.confirm_pairs(bench, nominal, [lead], SimpleNamespace(scores=[]), without_place)
+    pairs.confirm_pairs(bench, nominal, [lead], SimpleNamespace(scores=[]), without_place)
     return asked
 
 
@@ -47,3 +48,29 @@ def test_what_promises_nothing_is_not(monkeypatch):
 def test_a_law_without_a_name_far_ahead_leaves_none_worth_its_runs(monkeypatch, ahead, expected):
     asked = confirm(monkeypatch, without_place=150.0 + ahead, partner=14.0, joint=70.0)
     assert len(asked) == expected
+
+
+def a_fit(evidence: float, values: dict[str, float], sigma: float = 0.1) -> SimpleNamespace:
+    covariance = np.diag([0.01, *(sigma**2 for _ in values)])
+    return SimpleNamespace(
+        hypothesis=tuple(values), evidence=evidence, values=values, covariance=covariance, log_p_m=7.0
+    )
+
+
+@pytest.mark.parametrize(
+    ("second", "pair", "again", "expected"),
+    [
+        (0.05, 60.0, 62.0, 62.0),  # the pair's other effect is absent: its single lies better from there
+        (0.05, 60.0, 40.0, 50.0),  # but not always
+        (0.5, 60.0, 62.0, 50.0),  # both are at work
+        (0.05, 45.0, 62.0, 50.0),  # the single leads as it is
+    ],
+)
+def test_a_pair_whose_other_effect_is_absent_says_where_its_single_lies(
+    monkeypatch, second, pair, again, expected
+):
+    fits = [a_fit(50.0, {"strength_slope": -0.2})]
+    leading = a_fit(pair, {"strength_slope": -0.4, "pore_gas": second})
+    monkeypatch.setattr(pairs, "fit_hypothesis", lambda *_, **__: a_fit(again, {"strength_slope": -0.4}))
+    (single,) = pairs.return_to_singles(None, fits, [leading])
+    assert single.evidence == expected
