@@ -30,6 +30,7 @@ from scipy.stats import beta
 
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
+from labsim.diagnosis.average import average_p_m
 from labsim.diagnosis.campaign import judge_campaign
 from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
@@ -90,6 +91,7 @@ def judge_hidden(
     }
     moved, width = found.best.over_shapes
     sigma = math.hypot(math.sqrt(found.best.covariance[0, 0]), width)
+    averaged = average_p_m(found.verdict, found.nominal, found.rivals, campaign.p_m_range)
     value = next((value for values in hidden.effects.values() for value in values.values()), math.nan)
     first = found.verdict.probabilities[0]
     return {
@@ -101,6 +103,7 @@ def judge_hidden(
         "p_m": hidden.p_m,
         "log_p_m": found.best.log_p_m + moved,
         "log_p_m_sigma": sigma,
+        "p_m_averaged_90": np.quantile(averaged, [0.05, 0.95]).tolist(),
         "value": value,
         "found": {
             name: found.bench.effects[name].amplitudes[0].null + amplitude
@@ -193,6 +196,9 @@ def interval(hits: pd.Series) -> str:
 def report(rows: list[dict]) -> None:
     table = pd.DataFrame(rows)
     table["inside"] = (table.log_p_m - np.log(table.p_m)).abs() < 1.645 * table.log_p_m_sigma
+    table["averaged"] = [
+        low < p_m < high for (low, high), p_m in zip(table.p_m_averaged_90, table.p_m, strict=True)
+    ]
     table["exact"] = table["first"] == table.cause
     twins = [
         {other for near in alike.values() for other, cosine in near.items() if abs(cosine) > CONFUSABLE}
@@ -215,8 +221,9 @@ def report(rows: list[dict]) -> None:
             f"{strength:.0f} sigma ({spread}): exact {interval(some.exact)}; class {interval(some['class'])}"
         )
         print(f"  exact where no other is alike {interval(some.exact[some.alone])}")
+        print(f"  wrong above 0.5 {interval(some.named & ~some['class'])}")
         print(
-            f"  wrong above 0.5 {interval(some.named & ~some['class'])}; p_m in its 90 % interval {interval(some.inside)}"
+            f"  p_m in its 90 % interval {interval(some.inside)}; over all causes {interval(some.averaged)}"
         )
         for _, row in some[~some.exact].iterrows():
             print(f"    {row.cause} {row.value:.3g}: {[(name, round(p, 3)) for name, p in row.ranked[:3]]}")

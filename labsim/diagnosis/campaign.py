@@ -17,7 +17,8 @@ from ..inference.nodes import amplitude_nodes, own_node
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.workbench import Workbench
-from ..records import Campaign
+from ..records import Campaign, FloatArray
+from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
@@ -57,7 +58,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Diagnosis(Judgement):
-    """Everything diagnose found; report.tables writes it as diagnosis.json."""
+    """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa."""
 
     confusable: list[tuple[str, str, float]]
     held_out_nominal: HeldOut
@@ -65,6 +66,7 @@ class Diagnosis(Judgement):
     gain: Gain
     posterior_nominal: Posterior
     posterior_extended: Posterior
+    p_m_averaged: FloatArray
     scatter: tuple[float, float]
     runs_new: int
     runs_reused: int
@@ -153,6 +155,7 @@ def diagnose_campaign(
         gain=measure_gain(held_nominal, held_best),
         posterior_nominal=posterior,
         posterior_extended=extended,
+        p_m_averaged=average_p_m(found.verdict, nominal, found.rivals, campaign.p_m_range, seed=seed),
         scatter=estimate_scatter(bench, nominal),
         runs_new=store.new,
         runs_reused=store.reused,

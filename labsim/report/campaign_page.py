@@ -22,7 +22,7 @@ from .law_words import describe_laws, size_of_missing
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
-from .phrases import say_p_value, say_probability, state_p_value
+from .phrases import CERTAIN, say_p_value, say_probability, state_p_value
 from .provenance import trace_origin
 
 SAID = {"none": "the nominal model", "unknown": "no listed cause"}
@@ -74,6 +74,9 @@ def write_campaign_page(
         percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
         extended = quantiles["extended"]
         tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))
+        if found.verdict.probabilities[0][1] < CERTAIN:
+            middle, spread = quantiles["averaged"]["q50"] / 1e3, _between(quantiles["averaged"])
+            tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
         tiles.append(("gone on held-out drops", percent, "of the removable discrepancy"))
     figures = _figures(found.bench, views, maps, posteriors)
     held = [(labels[0], found.held_out_nominal.rms)]

@@ -17,7 +17,7 @@ from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..sph import solver_hash
 from .law_words import describe_unknown, say_missing
-from .phrases import say_probability
+from .phrases import CERTAIN, say_probability
 
 NUMERICAL_DEPTH = (
     0.0043  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
@@ -112,6 +112,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "p_m_Pa": {
             "nominal": summarise(found.posterior_nominal.samples("p_m_Pa")),
             "extended": summarise(found.posterior_extended.samples("p_m_Pa")),
+            "averaged": summarise(found.p_m_averaged),
         },
         "gain": {
             "rms_nominal_m": gain.rms_nominal,
@@ -192,6 +193,9 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         lines.append(f"  {probability:11.3f}  {' + '.join(hypothesis)}")
     if others := found.verdict.probabilities[len(worth) :]:
         lines.append(f"  {sum(p for _, p in others):11.3f}  the {len(others)} others together")
+    if found.verdict.word == "effect" and found.verdict.probabilities[0][1] < CERTAIN:
+        low, high = np.quantile(found.p_m_averaged, [0.05, 0.95]) / 1e3
+        lines.append(f"  p_m whichever of these is at work: {low:.2f} to {high:.2f} kPa (90 %)")
     gain = found.gain
     nearest = "the nearest listed cause, " if found.verdict.word == "unknown" else ""
     lines.append(

@@ -11,6 +11,8 @@ SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm"), "1": (1.0
 
 SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
+CERTAIN = 0.95  # probability of a cause from which p_m beside another is not worth a word
+
 
 def shown_unit(parameter: Parameter) -> tuple[float, str]:
     return SHOWN.get(parameter.unit, (1.0, parameter.unit))

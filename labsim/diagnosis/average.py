@@ -1,0 +1,39 @@
+"""p_m whichever cause is at work: that of every fit, by the probability of its cause.
+
+Causes that cannot be told apart may ask for different dust (ct_scale and filling_factor do), and the p_m of the first of them is
+then no answer. Hypotheses that were never simulated, and unknown, have no p_m and stay out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import truncnorm
+
+from ..inference.fitting import Fit
+from ..records import FloatArray
+from .judge import Verdict
+
+DRAWS = 40_000
+
+
+def average_p_m(
+    verdict: Verdict, nominal: Fit, rivals: Sequence[Fit], p_m_range: tuple[float, float], *, seed: int = 1
+) -> FloatArray:
+    """Draws of p_m, Pa, (DRAWS,): Gaussians of ln p_m cut at the stated range, shapes of effects included."""
+    probability = dict(verdict.probabilities)
+    fits = [nominal, *rivals]
+    weights = np.array([probability.get(fit.hypothesis or ("none",), 0.0) for fit in fits])
+    if not weights.sum() > 0.0:
+        weights = np.array([1.0] + [0.0] * len(rivals))
+    rng = np.random.default_rng(seed)
+    low, high = (math.log(p_m) for p_m in p_m_range)
+    draws = []
+    for fit, count in zip(fits, rng.multinomial(DRAWS, weights / weights.sum()), strict=True):
+        moved, width = fit.over_shapes
+        mean, sigma = fit.log_p_m + moved, math.hypot(math.sqrt(fit.covariance[0, 0]), width)
+        ends = (low - mean) / sigma, (high - mean) / sigma
+        draws.append(truncnorm.rvs(*ends, loc=mean, scale=sigma, size=count, random_state=rng))
+    return np.exp(np.concatenate(draws))

@@ -1,0 +1,58 @@
+"""p_m over causes: a mixture whose share, middle and spread are known, cut at the stated range."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from labsim.diagnosis.average import average_p_m
+from labsim.diagnosis.judge import Verdict
+
+RANGE = (300.0, 6000.0)
+
+
+def a_fit(hypothesis, p_m, sigma, over_shapes=(0.0, 0.0)):
+    return SimpleNamespace(
+        hypothesis=hypothesis,
+        log_p_m=math.log(p_m),
+        covariance=np.array([[sigma**2]]),
+        over_shapes=over_shapes,
+    )
+
+
+def test_causes_count_by_their_probability_and_what_has_no_p_m_not_at_all():
+    nominal, scale, filling = (
+        a_fit((), 900.0, 0.02),
+        a_fit(("ct_scale",), 1428.0, 0.02),
+        a_fit(("filling_factor",), 1174.0, 0.03),
+    )
+    verdict = Verdict(
+        "effect",
+        [
+            (("ct_scale",), 0.45),
+            (("filling_factor",), 0.3),
+            (("unknown",), 0.2),
+            (("pore_gas",), 0.05),
+            (("none",), 0.0),
+        ],
+    )
+    draws = average_p_m(verdict, nominal, [scale, filling], RANGE)
+    softer = draws < 1300.0
+    assert np.mean(softer) == pytest.approx(0.3 / 0.75, abs=0.01)
+    assert np.median(draws[softer]) == pytest.approx(1174.0, rel=2e-3)
+    assert np.std(np.log(draws[~softer])) == pytest.approx(0.02, rel=0.03)
+    low, high = np.quantile(draws, [0.05, 0.95])
+    assert low < 1195.0 < high  # what the first cause alone would exclude
+
+
+def test_one_certain_cause_has_its_own_p_m_with_its_shapes():
+    fit = a_fit(("strength_rate",), 1058.0, 0.043, over_shapes=(0.014, 0.025))
+    draws = average_p_m(Verdict("effect", [(("strength_rate",), 1.0)]), a_fit((), 1634.0, 0.02), [fit], RANGE)
+    assert np.mean(np.log(draws)) == pytest.approx(math.log(1058.0) + 0.014, abs=1e-3)
+    assert np.std(np.log(draws)) == pytest.approx(math.hypot(0.043, 0.025), rel=0.02)
+
+
+def test_no_draw_lies_outside_the_range_and_unknown_alone_leaves_the_nominal_model():
+    draws = average_p_m(Verdict("unknown", [(("unknown",), 1.0)]), a_fit((), 294.0, 0.02), [], RANGE)
+    assert draws.min() >= 300.0 and draws.max() < 330.0
