@@ -17,7 +17,7 @@ from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..sph import solver_hash
 from .law_words import describe_unknown, say_missing
-from .phrases import CERTAIN, say_probability
+from .phrases import CERTAIN, say_amount, say_probability
 
 NUMERICAL_DEPTH = (
     0.0043  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
@@ -165,9 +165,9 @@ def say_verdict(found: Diagnosis) -> str:
         effect = found.bench.effects[name]
         parameter = effect.amplitudes[0]
         value = parameter.null + found.best.values.get(name, 0.0)
-        amount = f"{value:.3g} {parameter.unit}".removesuffix(" 1")
+        amount = say_amount(parameter, value)
         for shape in (each for each in effect.parameters if each.shape):  # eta s^n says nothing without n
-            amount += f", {shape.name} = " + f"{shape.null:.3g} {shape.unit}".removesuffix(" 1")
+            amount += f", {shape.name} = {say_amount(shape, shape.null)}"
         title = effect.title[0].lower() + effect.title[1:]
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     return (

@@ -18,6 +18,12 @@ def shown_unit(parameter: Parameter) -> tuple[float, str]:
     return SHOWN.get(parameter.unit, (1.0, parameter.unit))
 
 
+def say_amount(parameter: Parameter, value: float) -> str:
+    """Three digits of a value (SI), in the unit that people use; of a pure number no unit."""
+    factor, unit = shown_unit(parameter)
+    return f"{value * factor:.3g} {unit}".rstrip()
+
+
 def add_article(label: str) -> str:
     return "the nominal model" if label == "nominal" else label
 
