@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -40,6 +41,8 @@ def begin(tmp_path: Path) -> Begin:
             env=environment,
             cwd=tmp_path,
             start_new_session=True,
+            # what a shell starts with & ignores interrupts, and so would all that it starts
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         started.append(process)
         return process
