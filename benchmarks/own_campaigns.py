@@ -89,8 +89,7 @@ def judge_hidden(
         for name in hidden.effects
         if name in names
     }
-    moved, width = found.best.over_shapes
-    sigma = math.hypot(math.sqrt(found.best.covariance[0, 0]), width)
+    log_p_m, sigma = found.best.log_p_m_over_shapes
     averaged = average_p_m(found.verdict, found.nominal, found.rivals, campaign.p_m_range)
     value = next((value for values in hidden.effects.values() for value in values.values()), math.nan)
     first = found.verdict.probabilities[0]
@@ -101,7 +100,7 @@ def judge_hidden(
         "counted": counted,
         "seed": seed,
         "p_m": hidden.p_m,
-        "log_p_m": found.best.log_p_m + moved,
+        "log_p_m": log_p_m,
         "log_p_m_sigma": sigma,
         "p_m_averaged_90": np.quantile(averaged, [0.05, 0.95]).tolist(),
         "value": value,

@@ -101,10 +101,10 @@ def main() -> None:
     table["change"] *= 100
     grouped = table.groupby(["hidden", "campaign"])
     result = grouped.agg(
-        drops="left",
-        least="change",
-        most="change",
-        mean="left",
+        drops=("left", "size"),
+        least=("change", "min"),
+        most=("change", "max"),
+        mean=("left", "mean"),
         rms=("left", lambda left: float(np.sqrt(np.mean(left**2)))),
     )
     change = grouped.change.agg(lambda change: float(np.sqrt(np.mean(change**2))))

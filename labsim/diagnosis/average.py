@@ -32,8 +32,7 @@ def average_p_m(
     low, high = (math.log(p_m) for p_m in p_m_range)
     draws = []
     for fit, count in zip(fits, rng.multinomial(DRAWS, weights / weights.sum()), strict=True):
-        moved, width = fit.over_shapes
-        mean, sigma = fit.log_p_m + moved, math.hypot(math.sqrt(fit.covariance[0, 0]), width)
+        mean, sigma = fit.log_p_m_over_shapes
         ends = (low - mean) / sigma, (high - mean) / sigma
         draws.append(truncnorm.rvs(*ends, loc=mean, scale=sigma, size=count, random_state=rng))
     return np.exp(np.concatenate(draws))

@@ -54,6 +54,11 @@ class Parameter:
         density = self.prior.logpdf(value) - math.log(inside)
         return np.where((value >= low) & (value <= high), density, -np.inf)
 
+    def hold(self, amplitude: float) -> float:
+        """null plus an amplitude, kept inside the limits: null plus what is left to a limit may round beyond it."""
+        low, high = self.limits
+        return min(max(self.null + amplitude, low), high)
+
     def draw(self, rng: np.random.Generator) -> float:
         """A value from the prior between the limits."""
         below, above = (float(self.prior.cdf(limit)) for limit in self.limits)
@@ -187,6 +192,11 @@ class Effect:
         """Whether the effect is off at these values; one without parameters never is."""
         full = self.at(values)
         return bool(self.amplitudes) and all(full[each.name] == each.null for each in self.amplitudes)
+
+    def hold(self, amplitude: float) -> float:
+        """null plus an amplitude, kept inside the limits: null plus what is left to a limit may round beyond it."""
+        low, high = self.limits
+        return min(max(self.null + amplitude, low), high)
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """All parameters from their priors."""

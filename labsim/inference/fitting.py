@@ -14,7 +14,6 @@ import numpy as np
 from scipy.special import log_ndtr
 from scipy.stats import chi2
 
-from ..effects import Parameter
 from ..records import FloatArray
 from .blocks import Block
 from .drop_model import DropModel
@@ -52,6 +51,12 @@ class Fit:
     scan_speeds: tuple[float, ...] = ()  # ln of the impact speeds of the scans, at their best
     # of ln p_m over the shapes of the effect that were fitted, by their evidence: mean minus this one's, standard deviation
     over_shapes: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def log_p_m_over_shapes(self) -> tuple[float, float]:
+        """Mean and standard deviation of ln p_m, those of the effect's shapes included."""
+        moved, width = self.over_shapes
+        return self.log_p_m + moved, math.hypot(math.sqrt(self.covariance[0, 0]), width)
 
 
 def fit_hypothesis(
@@ -114,7 +119,8 @@ def fit_hypothesis(
         evidence += 0.5 * (moved / sigma) ** 2 + log_share_inside(*between, moved, sigma)
     for name in hypothesis:
         parameter = bench.effects[name].amplitudes[0]
-        evidence += _log_prior(parameter, values[name]) + bench.shape_evidence.get(name, 0.0)
+        evidence += float(parameter.log_prior(parameter.hold(values[name])))
+        evidence += bench.shape_evidence.get(name, 0.0)
     return Fit(
         hypothesis,
         log_p_m,
@@ -146,12 +152,6 @@ def move_nuisances(
         speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
         shift = max(shift, 0.5 * moved_by)
     return shift
-
-
-def _log_prior(parameter: Parameter, amplitude: float) -> float:
-    """ln of the prior density; null plus an amplitude at a limit may round beyond it, where there is none."""
-    low, high = parameter.limits
-    return float(parameter.log_prior(min(max(parameter.null + amplitude, low), high)))
 
 
 def log_share_inside(low: float, high: float, mean: float, sigma: float) -> float:
@@ -271,8 +271,7 @@ def _priors(bench: Workbench, values: Mapping[str, float]) -> dict[str, tuple[fl
 
 def _inside(bench: Workbench, name: str, amplitude: float) -> float:
     parameter = bench.effects[name].amplitudes[0]
-    low, high = parameter.limits
-    return float(np.clip(parameter.null + amplitude, low, high)) - parameter.null
+    return parameter.hold(amplitude) - parameter.null
 
 
 def _limit(

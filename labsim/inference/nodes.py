@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..effects import Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
@@ -54,7 +52,7 @@ def amplitude_nodes(
     """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits; ``around``: one
     more beyond them, so that the curve between two does not depend on the side that the estimate came from."""
     parameter = effect.amplitudes[0]
-    step, (low, high) = parameter.step, parameter.limits
+    step = parameter.step
     place = amplitude / step
     # of the numerics, much finer runs would cost more than they say
     if abs(place) <= 1.0 or effect.kind == "numerics":
@@ -67,7 +65,7 @@ def amplitude_nodes(
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
     nodes = []
     for m in wanted:
-        value = float(np.clip(parameter.null + m * step, low, high)) - parameter.null
+        value = parameter.hold(m * step) - parameter.null
         if value == 0.0:  # the limit is the null on that side
             value = step
         if value not in nodes:

@@ -158,11 +158,7 @@ def hide(effect: Effect, amplitude: float, shapes: Mapping[str, float] | None = 
     """One effect; shapes that are not given are OFF_DEFAULT of the stated ones."""
     parameter = effect.amplitudes[0]
     values = {p.name: OFF_DEFAULT * p.null for p in effect.parameters if p.shape}
-    low, high = parameter.limits
-    value = min(
-        max(parameter.null + amplitude, low), high
-    )  # null plus what is left to a limit may round beyond it
-    return Hidden({effect.name: {parameter.name: value, **values, **(shapes or {})}})
+    return Hidden({effect.name: {parameter.name: parameter.hold(amplitude), **values, **(shapes or {})}})
 
 
 def _aim(strengths: Mapping[float, float], sigma: float) -> float:

@@ -128,8 +128,7 @@ class Workbench:
     def at(self, name: str, amplitude: float) -> dict[str, float]:
         """Values of an effect's parameters at an amplitude, kept inside the limits."""
         parameter = self.effects[name].amplitudes[0]
-        low, high = parameter.limits
-        return {parameter.name: float(np.clip(parameter.null + amplitude, low, high))}
+        return {parameter.name: parameter.hold(amplitude)}
 
     def change(self, name: str, amplitude: float) -> Change:
         effect, values = self.effects[name], self.at(name, amplitude)

@@ -148,7 +148,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
 def say_verdict(found: Diagnosis) -> str:
     """The verdict as one sentence that a laboratory can act on."""
     best, probability = found.verdict.probabilities[0]
-    p_m = math.exp(found.best.log_p_m + found.best.over_shapes[0]) / 1e3
+    p_m = math.exp(found.best.log_p_m_over_shapes[0]) / 1e3
     if found.verdict.word == "none":
         nominal = math.exp(found.nominal.log_p_m) / 1e3
         return (

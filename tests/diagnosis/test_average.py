@@ -1,22 +1,29 @@
 """p_m over causes: a mixture whose share, middle and spread are known, cut at the stated range."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from labsim.diagnosis.average import average_p_m
 from labsim.diagnosis.judge import Verdict
+from labsim.inference.fitting import Fit
 
 RANGE = (300.0, 6000.0)
 
 
 def a_fit(hypothesis, p_m, sigma, over_shapes=(0.0, 0.0)):
-    return SimpleNamespace(
-        hypothesis=hypothesis,
-        log_p_m=math.log(p_m),
-        covariance=np.array([[sigma**2]]),
+    return Fit(
+        hypothesis,
+        math.log(p_m),
+        {},
+        np.array([[sigma**2]]),
+        chi_square=0.0,
+        points=0,
+        log_likelihood=0.0,
+        evidence=0.0,
+        linear=None,
+        models=[],
         over_shapes=over_shapes,
     )
 
