@@ -24,6 +24,7 @@ EXPLORED = ("material", "contact")  # kinds that p_m can make up for; samples ar
 FAILED = 0.05  # p value of the nominal model below which it is worth while
 EXPLAINED = 0.01  # p value of a fit above which nothing more is looked for
 PROMISING = 3.0  # ln Bayes factor of the screening from which it is
+NOWHERE = 2e4  # ln likelihood behind it at which one is not followed at all
 HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed to its end
 FIRST_STEPS = 4
 
@@ -64,7 +65,13 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
                 first = _start_at(bench, nominal, name, start)
                 begin = (start, {name: first})
                 fit = fit_hypothesis(
-                    bench, (name,), begin, coarse=True, nuisances=nominal, iterations=FIRST_STEPS
+                    bench,
+                    (name,),
+                    begin,
+                    coarse=True,
+                    nuisances=nominal,
+                    iterations=FIRST_STEPS,
+                    least=top - NOWHERE,
                 )
                 if fit.evidence > top - HOPELESS:
                     begin = (fit.log_p_m, fit.values)

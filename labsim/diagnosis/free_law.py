@@ -18,9 +18,12 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import truncnorm
 
 from ..inference.blocks import Block
-from ..inference.fitting import Fit, goodness_of_fit, linearise_at, log_share_inside, move_nuisances
+from ..inference.evidence import log_share_inside
+from ..inference.fitting import Fit, goodness_of_fit
 from ..inference.likelihood import solve_globals
 from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
+from ..inference.steps import move_nuisances
+from ..inference.tangents import linearise_at
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .hats import FreeLaw, list_laws, make_hats

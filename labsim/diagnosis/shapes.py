@@ -15,8 +15,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..effects import Effect, Parameter
-from ..inference.fitting import Fit, linearise_dust
+from ..inference.fitting import Fit
 from ..inference.likelihood import solve_globals
+from ..inference.tangents import linearise_dust
 from ..inference.workbench import Workbench
 from .screen import Screening
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..inference.blocks import Block
-from ..inference.fitting import Fit, log_share_inside
+from ..inference.evidence import log_share_inside
+from ..inference.fitting import Fit
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from ..records import FloatArray

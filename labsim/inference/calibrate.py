@@ -16,11 +16,12 @@ from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray
 from .drop_terms import Terms
-from .fitting import Fit, fit_hypothesis, goodness_of_fit, linearise_at
+from .fitting import Fit, fit_hypothesis, goodness_of_fit
 from .measure import Measurements, measure
 from .posterior import Posterior, QuadraticResidual, measure_residual, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
+from .tangents import linearise_at
 from .workbench import Workbench, open_workbench
 
 LOST = 1e-6  # p value of a nominal fit that is not believed

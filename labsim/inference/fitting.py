@@ -10,25 +10,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.special import log_ndtr
 from scipy.stats import chi2
 
 from ..records import FloatArray
-from .blocks import Block
 from .drop_model import DropModel
-from .drop_terms import Probe
-from .likelihood import Linearised, linearise, solve_globals, update_nuisances
+from .evidence import integrate_by_laplace
+from .likelihood import Linearised
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, screening_node
-from .scans import linearise_scan, update_speed
-from .undisturbed import Seen, linearise_undisturbed
+from .steps import Place, Solved, advance, hold, settle_nuisances, solve_at
+from .tangents import linearise_at
 from .workbench import Workbench, find_family
 
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
-SETTLED = 0.02  # of a standard deviation
-MOST_CUT = 1.0 - 1e-12  # of a Gaussian, by two limits closer than rounding
-BEYOND = 0.7  # of ln p_m, how far outside its range an estimate may stray
+LOWER = 3.0  # ln likelihood that a step may lose: its aim, the least χ², lies that far from the top or less
+MOST_HALVED = 3  # times a step is
+MOST_NUISANCES = 3  # times nuisances alone are moved
 
 
 @dataclass(frozen=True)
@@ -68,98 +65,58 @@ def fit_hypothesis(
     around: bool = False,
     nuisances: Fit | None = None,
     iterations: int = ITERATIONS,
+    least: float = -math.inf,
 ) -> Fit:
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
+    A step that ends lower than it began, by more than LOWER, is halved until it does not, MOST_HALVED times at most.
     coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
+    least : ln likelihood, priors included, of a start below which no step is taken.
     """
-    # nuisances are the fit's own, tables those of the workbench
+    # tables are those of the workbench, nuisances the fit's own
     models = [
         replace(model, table=bench.tables[_table_number(bench, model)])
         for model in (nuisances.models if nuisances is not None else bench.models)
     ]
-    speeds = list(nuisances.scan_speeds if nuisances is not None else (scan.stated for scan in bench.scans))
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    log_p_m, values = start[0], {name: start[1].get(name, 0.0) for name in hypothesis}
-    names = ("ln_p_m", *hypothesis)
-    for iteration in range(iterations):
-        _ask(bench, hypothesis, log_p_m, values, coarse=coarse, around=around)
-        linear = linearise_at(bench, models, speeds, log_p_m, values)
-        step, covariance, _chi, _logdet, weighted = solve_globals(
-            linear.blocks, names, _priors(bench, values)
-        )
-        moved = _limit(bench, hypothesis, step, values)
-        new_log = float(np.clip(log_p_m + np.clip(moved[0], -0.7, 0.7), low - BEYOND, high + BEYOND))
-        change = [abs(new_log - log_p_m) / math.sqrt(covariance[0, 0])]
-        log_p_m = new_log
-        for k, name in enumerate(hypothesis):
-            before = values[name]
-            values[name] = _inside(bench, name, before + float(moved[k + 1]))
-            change.append(abs(values[name] - before) / math.sqrt(covariance[k + 1, k + 1]))
-        shift = move_nuisances(bench, models, speeds, linear, weighted)
-        if max(change) < SETTLED and shift < 0.05 and iteration > 0:
+    speeds = nuisances.scan_speeds if nuisances is not None else tuple(scan.stated for scan in bench.scans)
+    values = {name: hold(bench, name, start[1].get(name, 0.0)) for name in hypothesis}
+    place = Place(start[0], values, models, speeds)
+    best: Solved | None = None
+    share, settled, calm = 1.0, False, False
+    for iteration in range(iterations + 1):
+        _ask(bench, hypothesis, place.log_p_m, place.values, coarse=coarse, around=around)
+        there = solve_at(bench, place)
+        if best is not None and there.height < best.height - LOWER:
+            # heights compare where nuisances are at their best; the runs made since count for both
+            best = settle_nuisances(bench, solve_at(bench, best.place), 0 if calm else MOST_NUISANCES)
+            calm = True
+            if there.height < best.height - LOWER:
+                there = settle_nuisances(bench, there, 1)
+        if best is None or there.height >= best.height - LOWER:
+            best, share, calm = there, 1.0, False
+        else:
+            share *= 0.5
+        if settled or share < 0.5**MOST_HALVED or best.height < least:
             break
-    _ask(bench, hypothesis, log_p_m, values, coarse=coarse, around=around)
-    linear = linearise_at(bench, models, speeds, log_p_m, values)
-    step, covariance, _chi, logdet, _ = solve_globals(linear.blocks, names, _priors(bench, values))
-    solved_here = sum(block.chi_square for block in linear.blocks)
-    n = sum(block.residual.size for block in linear.blocks)
-    log_likelihood = -0.5 * (solved_here + logdet + n * math.log(2 * math.pi))
-    evidence = (
-        log_likelihood + 0.5 * len(names) * math.log(2 * math.pi) + 0.5 * np.linalg.slogdet(covariance)[1]
-    )
-    evidence -= math.log(high - low)
-    limits = [(low - log_p_m, high - log_p_m)]
-    for name in hypothesis:
-        parameter = bench.effects[name].amplitudes[0]
-        limits.append(tuple(limit - parameter.null - values[name] for limit in parameter.limits))
-    for moved, sigma, between in zip(step, np.sqrt(np.diag(covariance)), limits, strict=True):
-        # Laplace's formula where a limit cuts the Gaussian, or its top, off
-        evidence += 0.5 * (moved / sigma) ** 2 + log_share_inside(*between, moved, sigma)
-    for name in hypothesis:
-        parameter = bench.effects[name].amplitudes[0]
-        evidence += float(parameter.log_prior(parameter.hold(values[name])))
-        evidence += bench.shape_evidence.get(name, 0.0)
+        place, settled = advance(bench, best, share)
+        settled = settled and iteration > 0
+    assert best is not None
+    if not (settled or calm):
+        best = settle_nuisances(bench, best, MOST_NUISANCES)
     return Fit(
         hypothesis,
-        log_p_m,
-        values,
-        covariance,
-        solved_here,
-        n,
-        log_likelihood,
-        float(evidence),
-        linear,
-        models,
-        tuple(speeds),
+        best.place.log_p_m,
+        best.place.values,
+        best.covariance,
+        best.chi_square,
+        best.points,
+        best.log_likelihood,
+        integrate_by_laplace(bench, best),
+        best.linear,
+        best.place.models,
+        best.place.speeds,
     )
-
-
-def move_nuisances(
-    bench: Workbench,
-    models: list[DropModel],
-    speeds: list[float],
-    linear: Linearised,
-    weighted: Sequence[FloatArray],
-) -> float:
-    """Move the nuisances of drops, and speeds (ln) of scans, to their conditional best values; weighted : as solve_globals gives.
-
-    The largest move: in prior widths, contact time in units of a frame, speeds of scans in two of theirs.
-    """
-    shift = update_nuisances(models, linear, weighted[0])
-    for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
-        speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
-        shift = max(shift, 0.5 * moved_by)
-    return shift
-
-
-def log_share_inside(low: float, high: float, mean: float, sigma: float) -> float:
-    """ln of the share of a Gaussian between two limits: what is left of an integral that a flat prior ends at."""
-    below, above = (low - mean) / sigma, (high - mean) / sigma
-    if below > 0.0:  # the other tail, where shares do not round to 1
-        below, above = -above, -below
-    return float(log_ndtr(above) + math.log1p(-min(math.exp(log_ndtr(below) - log_ndtr(above)), MOST_CUT)))
 
 
 def goodness_of_fit(fit: Fit) -> float:
@@ -184,65 +141,6 @@ def with_probes(bench: Workbench, fit: Fit, names: Sequence[str], log_p_m: float
     return linearise_at(bench, fit.models, fit.scan_speeds, place, fit.values, names)
 
 
-def linearise_at(
-    bench: Workbench,
-    models: list[DropModel],
-    scan_speeds: Sequence[float],
-    log_p_m: float,
-    values: Mapping[str, float],
-    further: Sequence[str] = (),
-) -> Linearised:
-    probes = {}
-    for name, amplitude in {**{name: 0.0 for name in further}, **values}.items():
-        step = 0.05 * bench.effects[name].amplitudes[0].step
-        parameter = bench.effects[name].amplitudes[0]
-        low, high = parameter.limits
-        if not low <= parameter.null + amplitude + step <= high:
-            step = -step
-        probes[name] = _stand(bench, {**values, name: amplitude + step}, step)
-    nominal = _stand(bench, values)
-    linear = linearise(models, log_p_m, nominal, bench.terms, probes)
-    scans = tuple(
-        linearise_scan(scan, speed, log_p_m, nominal, bench.terms.scatter, probes)
-        for scan, speed in zip(bench.scans, scan_speeds, strict=True)
-    )
-    return replace(linear, scans=scans, undisturbed=tuple(_linearise_dust(bench, nominal, probes)))
-
-
-def _stand(bench: Workbench, values: Mapping[str, float], step: float = 0.0) -> Probe:
-    return Probe(values, bench.instruments(values), bench.log_offsets(values), step)
-
-
-def linearise_dust(bench: Workbench, values: Mapping[str, float], steps: Mapping[str, float]) -> list[Block]:
-    """The undisturbed dust about amplitudes, with tangents by the given steps; empty without scans."""
-    probes = {
-        name: _stand(bench, {**values, name: values.get(name, 0.0) + step}, step)
-        for name, step in steps.items()
-    }
-    return _linearise_dust(bench, _stand(bench, values), probes)
-
-
-def _linearise_dust(bench: Workbench, nominal: Probe, probes: Mapping[str, Probe]) -> list[Block]:
-    if not bench.undisturbed:
-        return []
-    plain = bench.grid.setting(bench.families[0], bench.families[0].speeds[0], 1000.0)
-
-    def see(point: Probe) -> dict[str, Seen]:
-        seen = {}
-        for dust in bench.undisturbed:
-            setting = plain
-            for name, amplitude in point.amplitudes.items():
-                if amplitude != 0.0:
-                    place = bench.places[dust.name]
-                    setting = bench.effects[name].apply(setting, bench.at(name, amplitude), place)
-            seen[dust.name] = (setting, point.instruments[dust.name])
-        return seen
-
-    moved = {name: (see(point), point.step) for name, point in probes.items()}
-    sigma = bench.campaign.sample.filling_factor_sigma
-    return [linearise_undisturbed(bench.undisturbed, see(nominal), moved, sigma)]
-
-
 def _ask(
     bench: Workbench,
     hypothesis: Hypothesis,
@@ -262,29 +160,3 @@ def _ask(
     ]
     if wanted:
         bench.require_changes(wanted, " and ".join(hypothesis), coarse=coarse)
-
-
-def _priors(bench: Workbench, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Per effect its distance from null and the width of its prior about it."""
-    return {name: (amplitude, bench.effects[name].amplitudes[0].scale) for name, amplitude in values.items()}
-
-
-def _inside(bench: Workbench, name: str, amplitude: float) -> float:
-    parameter = bench.effects[name].amplitudes[0]
-    return parameter.hold(amplitude) - parameter.null
-
-
-def _limit(
-    bench: Workbench, hypothesis: Hypothesis, step: FloatArray, values: Mapping[str, float]
-) -> FloatArray:
-    """Shorten a step so that no amplitude moves by more than 1.5 of its own simulation steps at once."""
-    factor = min(1.0, 0.7 / max(abs(float(step[0])), 1e-12))
-    for k, name in enumerate(hypothesis):
-        reach = (
-            1.5
-            * abs(bench.effects[name].amplitudes[0].step)
-            * max(1.0, abs(values[name] / bench.effects[name].amplitudes[0].step))
-        )
-        if abs(step[k + 1]) > reach:
-            factor = min(factor, reach / abs(float(step[k + 1])))
-    return step * factor

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
-from labsim.inference.fitting import log_share_inside
+from labsim.inference.evidence import log_share_inside
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.likelihood import solve_globals

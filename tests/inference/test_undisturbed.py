@@ -11,9 +11,9 @@ from labsim.ct.phantom import Phantom
 from labsim.ct.reduce import reduce_scan
 from labsim.diagnosis.shapes import lay_out_shapes, shape_parameter
 from labsim.effects import list_effects
-from labsim.inference.fitting import linearise_dust
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.runs import RunStore
+from labsim.inference.tangents import linearise_dust
 from labsim.inference.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.inference.workbench import open_workbench
 from labsim.records import Scan

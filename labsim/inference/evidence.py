@@ -1,0 +1,44 @@
+"""Integrals of Gaussians that limits cut."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from .steps import Solved, stop_at_limits
+from .workbench import Workbench
+
+MOST_CUT = 1.0 - 1e-12  # of a Gaussian, by two limits closer than rounding
+
+
+def integrate_by_laplace(bench: Workbench, here: Solved) -> float:
+    """ln evidence by Laplace's formula, where a limit cuts the Gaussian, or its top, off too."""
+    place, covariance = here.place, here.covariance
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    evidence = here.log_likelihood + 0.5 * len(covariance) * math.log(2 * math.pi)
+    evidence += 0.5 * np.linalg.slogdet(covariance)[1] - math.log(high - low)
+    limits = [(low - place.log_p_m, high - place.log_p_m)]
+    for name, value in place.values.items():
+        parameter = bench.effects[name].amplitudes[0]
+        least, most = parameter.limits
+        limits.append((least - parameter.null - value, most - parameter.null - value))
+        evidence += float(parameter.log_prior(parameter.hold(value))) + bench.shape_evidence.get(name, 0.0)
+    step, stopped = stop_at_limits(bench, here)
+    for k, between in enumerate(limits):
+        sigma = math.sqrt(covariance[k, k])
+        if k in stopped:
+            # the others are at their best with it: all that the top beyond gains is gained along this one
+            step[k] = here.step[k]
+            evidence += 0.5 * (step[k] / sigma) ** 2
+        evidence += log_share_inside(*between, step[k], sigma)
+    return float(evidence)
+
+
+def log_share_inside(low: float, high: float, mean: float, sigma: float) -> float:
+    """ln of the share of a Gaussian between two limits: what is left of an integral that a flat prior ends at."""
+    below, above = (low - mean) / sigma, (high - mean) / sigma
+    if below > 0.0:  # the other tail, where shares do not round to 1
+        below, above = -above, -below
+    return float(log_ndtr(above) + math.log1p(-min(math.exp(log_ndtr(below) - log_ndtr(above)), MOST_CUT)))

@@ -1,0 +1,143 @@
+"""Gauss-Newton steps of p_m and amplitudes: where a fit stands, what it sees from there, where it goes next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..records import FloatArray
+from .drop_model import DropModel
+from .likelihood import Linearised, solve_globals, update_nuisances
+from .scans import update_speed
+from .tangents import linearise_at
+from .workbench import Workbench
+
+SETTLED = 0.02  # of a standard deviation
+BEYOND = 0.7  # of ln p_m, how far outside its range an estimate may stray
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a fit stands. models : of the drops, with their nuisances; speeds : ln, of the scans."""
+
+    log_p_m: float
+    values: dict[str, float]
+    models: list[DropModel]
+    speeds: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The likelihood about a place, and the Gauss-Newton step from there.
+
+    log_likelihood : of the place itself; height : with the Gaussians that stand for the priors of amplitudes.
+    """
+
+    place: Place
+    linear: Linearised
+    step: FloatArray
+    covariance: FloatArray
+    chi_square: float
+    points: int
+    log_likelihood: float
+    height: float
+
+
+def solve_at(bench: Workbench, place: Place) -> Solved:
+    """The likelihood about a place with the runs that there are."""
+    linear = linearise_at(bench, place.models, place.speeds, place.log_p_m, place.values)
+    priors = {name: (value, bench.effects[name].amplitudes[0].scale) for name, value in place.values.items()}
+    step, covariance, _left, logdet, _weighted = solve_globals(
+        linear.blocks, ("ln_p_m", *place.values), priors
+    )
+    chi_square = sum(block.chi_square for block in linear.blocks)
+    points = sum(block.residual.size for block in linear.blocks)
+    log_likelihood = -0.5 * (chi_square + logdet + points * math.log(2 * math.pi))
+    height = log_likelihood - 0.5 * sum((away / width) ** 2 for away, width in priors.values())
+    return Solved(place, linear, step, covariance, chi_square, points, log_likelihood, height)
+
+
+def settle_nuisances(bench: Workbench, here: Solved, most: int) -> Solved:
+    """The same with the nuisances moved to their best there, ``most`` times."""
+    for _ in range(most):
+        place = here.place
+        models, speeds = [replace(model) for model in place.models], list(place.speeds)
+        weighted = [block.solve(block.residual) for block in here.linear.blocks]
+        shift = move_nuisances(bench, models, speeds, here.linear, weighted)
+        here = solve_at(bench, replace(place, models=models, speeds=tuple(speeds)))
+        if shift < 0.05:
+            break
+    return here
+
+
+def advance(bench: Workbench, here: Solved, share: float) -> tuple[Place, bool]:
+    """The next place, a share of the step on, and whether it is as good as the last."""
+    place = here.place
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    moved = share * _shorten(bench, stop_at_limits(bench, here)[0], place.values)
+    log_p_m = float(np.clip(place.log_p_m + np.clip(moved[0], -0.7, 0.7), low - BEYOND, high + BEYOND))
+    apart = [abs(log_p_m - place.log_p_m) / math.sqrt(here.covariance[0, 0])]
+    values: dict[str, float] = {}
+    for k, (name, before) in enumerate(place.values.items(), start=1):
+        values[name] = hold(bench, name, before + float(moved[k]))
+        apart.append(abs(values[name] - before) / math.sqrt(here.covariance[k, k]))
+    models, speeds = [replace(model) for model in place.models], list(place.speeds)
+    taken = {"ln_p_m": log_p_m - place.log_p_m}
+    taken |= {name: values[name] - before for name, before in place.values.items()}
+    weighted = []
+    for block in here.linear.blocks:
+        change = sum(part * block.tangents[name] for name, part in taken.items())
+        weighted.append(block.solve(block.residual - change))
+    shift = move_nuisances(bench, models, speeds, here.linear, weighted)
+    return Place(log_p_m, values, models, tuple(speeds)), max(apart) < SETTLED and shift < 0.05
+
+
+def move_nuisances(
+    bench: Workbench,
+    models: list[DropModel],
+    speeds: list[float],
+    linear: Linearised,
+    weighted: Sequence[FloatArray],
+) -> float:
+    """Move the nuisances of drops, and speeds (ln) of scans, to their conditional best values; weighted : as solve_globals gives.
+
+    The largest move: in prior widths, contact time in units of a frame, speeds of scans in two of theirs.
+    """
+    shift = update_nuisances(models, linear, weighted[0])
+    for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
+        speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
+        shift = max(shift, 0.5 * moved_by)
+    return shift
+
+
+def stop_at_limits(bench: Workbench, here: Solved) -> tuple[FloatArray, set[int]]:
+    """The step with amplitudes stopped at their limits, the others at their best with them; and the places of those stopped."""
+    step, stopped = here.step, set()
+    for k, (name, value) in enumerate(here.place.values.items(), start=1):
+        parameter = bench.effects[name].amplitudes[0]
+        low, high = parameter.limits
+        if not low <= parameter.null + value + step[k] <= high:
+            back = hold(bench, name, value + float(step[k])) - value - step[k]
+            step = step + here.covariance[k] / here.covariance[k, k] * back
+            stopped.add(k)
+    return step, stopped
+
+
+def hold(bench: Workbench, name: str, amplitude: float) -> float:
+    """An amplitude, inside the limits of its parameter."""
+    parameter = bench.effects[name].amplitudes[0]
+    return parameter.hold(amplitude) - parameter.null
+
+
+def _shorten(bench: Workbench, step: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """Shorten a step so that no amplitude moves by more than 1.5 of its own simulation steps at once."""
+    factor = min(1.0, 0.7 / max(abs(float(step[0])), 1e-12))
+    for moved, (name, value) in zip(step[1:], values.items(), strict=True):
+        unit = abs(bench.effects[name].amplitudes[0].step)
+        reach = 1.5 * unit * max(1.0, abs(value / unit))
+        if abs(moved) > reach:
+            factor = min(factor, reach / abs(float(moved)))
+    return step * factor
