@@ -41,6 +41,7 @@ def describe(name: str, found: Diagnosis) -> dict:
         "first": name_hypothesis(found.verdict.probabilities[0][0]),
         "probability": found.verdict.probabilities[0][1],
         "ranked": [(name_hypothesis(h), p) for h, p in found.verdict.probabilities],
+        "named": [name_hypothesis(h) for h, _ in found.verdict.named],
         "p_value": found.p_value,
         "p_m": float(np.median(p_m)),
         "p_m_90": tuple(np.quantile(p_m, [0.05, 0.95])),
@@ -74,6 +75,7 @@ def score(rows: list[dict], truth: dict) -> pd.DataFrame:
                 "rank": 1 + [h for h, _ in row["ranked"]].index(cause) if cause in probabilities else 0,
                 "exact": row["first"] == cause,
                 "class": row["first"] in alike and len(alike) <= 3,
+                "named": cause in row["named"],
                 "wrong>0.5": row["first"] not in alike
                 and row["first"] not in ("none", "unknown")
                 and row["probability"] > 0.5,
@@ -121,7 +123,8 @@ def main() -> None:
     lines = [
         f"{date.today()}, commit {commit}: {len(table)} campaigns",
         f"none called none {int((nulls['first'] == 'none').sum())} of {len(nulls)}; exact cause first "
-        f"{int(others.exact.sum())} of {len(others)}, class {int(others['class'].sum())} of {len(others)}; wrong cause with "
+        f"{int(others.exact.sum())} of {len(others)}, class {int(others['class'].sum())} of {len(others)}, among those named "
+        f"{int(others.named.sum())} of {len(others)}; wrong cause with "
         f"P > 0.5 {int(table['wrong>0.5'].sum())} of {len(table)}; mean Brier {table.Brier.mean():.3f}; p_m in its 90 % "
         f"interval {int(table['in 90 %'].sum())} of {len(table)}; median gain "
         f"{others.gain.median() if len(others) else math.nan:.2f}",

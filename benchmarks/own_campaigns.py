@@ -99,6 +99,7 @@ def judge_hidden(
         "strength": strength,
         "counted": counted,
         "seed": seed,
+        "named": [" + ".join(hypothesis) for hypothesis, _ in found.verdict.named],
         "p_m": hidden.p_m,
         "log_p_m": log_p_m,
         "log_p_m_sigma": sigma,
@@ -206,10 +207,11 @@ def report(rows: list[dict]) -> None:
     table["alone"] = [not names for names in twins]
     alike = [name in names for name, names in zip(table["first"], twins, strict=True)]
     table["class"] = table.exact | np.array(alike)
-    table["named"] = ~table["first"].isin(["none", "unknown"]) & (table.probability > 0.5)
+    table["among"] = [cause in named for cause, named in zip(table.cause, table.named, strict=True)]
+    table["sure"] = ~table["first"].isin(["none", "unknown"]) & (table.probability > 0.5)
     nulls = table[table.cause == "none"]
     if len(nulls):
-        print(f"nulls: not called none {interval(~nulls.exact)}; a cause above 0.5 {interval(nulls.named)}")
+        print(f"nulls: not called none {interval(~nulls.exact)}; a cause above 0.5 {interval(nulls.sure)}")
         print(
             f"  goodness of fit below 0.05 {interval(nulls.goodness < 0.05)}; p value below 0.05 {interval(nulls.p_value < 0.05)}"
         )
@@ -220,7 +222,8 @@ def report(rows: list[dict]) -> None:
             f"{strength:.0f} sigma ({spread}): exact {interval(some.exact)}; class {interval(some['class'])}"
         )
         print(f"  exact where no other is alike {interval(some.exact[some.alone])}")
-        print(f"  wrong above 0.5 {interval(some.named & ~some['class'])}")
+        print(f"  among the at most three that the verdict names {interval(some.among)}")
+        print(f"  wrong above 0.5 {interval(some.sure & ~some['class'])}")
         print(
             f"  p_m in its 90 % interval {interval(some.inside)}; over all causes {interval(some.averaged)}"
         )

@@ -15,6 +15,8 @@ TEMPERATURE = 3.0  # among causes: what tells one from another rests on details 
 # of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
 # most 5.5, the weakest that was 9.6
 NESTED = 2.0
+NAMED = 0.9  # probability that what a verdict names holds together
+MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,19 @@ class Verdict:
 
     word: str  # "none" | "effect" | "unknown"
     probabilities: list[tuple[Hypothesis, float]]
+
+    @property
+    def named(self) -> list[tuple[Hypothesis, float]]:
+        """The first and, where it is an effect, what the data hardly tell from it: until NAMED is reached, MOST_NAMED at most."""
+        if self.word != "effect":
+            return self.probabilities[:1]
+        before = 0.0
+        named = []
+        for hypothesis, probability in self.probabilities[:MOST_NAMED]:
+            if before < NAMED:
+                named.append((hypothesis, probability))
+            before += probability
+        return named
 
 
 def judge(

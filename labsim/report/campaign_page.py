@@ -22,10 +22,9 @@ from .law_words import describe_laws, size_of_missing
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
-from .phrases import CERTAIN, say_p_value, say_probability, state_p_value
+from .phrases import CERTAIN, say_hypothesis, say_p_value, say_probability, state_p_value
 from .provenance import trace_origin
 
-SAID = {"none": "the nominal model", "unknown": "no listed cause"}
 PICTURES = {
     "drops": "Every drop: measured depth against time, each simulation, and below it what each leaves, with the band of what a "
     "true model may leave. The numbers stand in the table above.",
@@ -54,6 +53,8 @@ def write_campaign_page(
         posteriors.append((labels[1], found.posterior_extended))
     gain = summary["gain"]
     quantiles = summary["p_m_Pa"]
+    (first, probability), *others = found.verdict.named
+    nearly = "".join(f"; {say_hypothesis(other)} {say_probability(p)}" for other, p in others)
     tiles = [
         ("p_m, nominal", f"{quantiles['nominal']['q50'] / 1e3:.2f} kPa", _between(quantiles["nominal"])),
         (
@@ -63,8 +64,8 @@ def write_campaign_page(
         ),
         (
             "most probable",
-            " + ".join(SAID.get(name, name) for name in found.verdict.probabilities[0][0]),
-            f"probability {say_probability(found.verdict.probabilities[0][1])}",
+            say_hypothesis(first),
+            f"probability {say_probability(probability)}{nearly}",
         ),
     ]
     if found.verdict.word == "unknown":
@@ -74,7 +75,7 @@ def write_campaign_page(
         percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
         extended = quantiles["extended"]
         tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))
-        if found.verdict.probabilities[0][1] < CERTAIN:
+        if probability < CERTAIN:
             middle, spread = quantiles["averaged"]["q50"] / 1e3, _between(quantiles["averaged"])
             tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
         tiles.append(("gone on held-out drops", percent, "of the removable discrepancy"))

@@ -17,7 +17,7 @@ from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..sph import solver_hash
 from .law_words import describe_unknown, say_missing
-from .phrases import CERTAIN, say_amount, say_probability
+from .phrases import CERTAIN, say_amount, say_hypothesis, say_probability
 
 NUMERICAL_DEPTH = (
     0.0043  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
@@ -108,6 +108,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "verdict": found.verdict.word,
         "p_value": found.p_value,
         "causes": causes,
+        "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
         "p_m_Pa": {
             "nominal": summarise(found.posterior_nominal.samples("p_m_Pa")),
@@ -170,9 +171,12 @@ def say_verdict(found: Diagnosis) -> str:
             amount += f", {shape.name} = {say_amount(shape, shape.null)}"
         title = effect.title[0].lower() + effect.title[1:]
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
+    apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in found.verdict.named[1:])
+    hardly = f" (these data hardly tell it from {apart})" if apart else ""
     return (
-        f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}; with it p_m is "
-        f"{p_m:.2f} kPa instead of {math.exp(found.nominal.log_p_m) / 1e3:.2f} kPa, and {say_gain(found.gain)}."
+        f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}{hardly}; with "
+        f"{' + '.join(best)} p_m is {p_m:.2f} kPa instead of {math.exp(found.nominal.log_p_m) / 1e3:.2f} kPa, and "
+        f"{say_gain(found.gain)}."
     )
 
 

@@ -11,6 +11,7 @@ SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm"), "1": (1.0
 
 SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
+SAID = {"none": "the nominal model", "unknown": "no listed cause"}
 CERTAIN = 0.95  # probability of a cause from which p_m beside another is not worth a word
 
 
@@ -22,6 +23,11 @@ def say_amount(parameter: Parameter, value: float) -> str:
     """Three digits of a value (SI), in the unit that people use; of a pure number no unit."""
     factor, unit = shown_unit(parameter)
     return f"{value * factor:.3g} {unit}".rstrip()
+
+
+def say_hypothesis(hypothesis: Sequence[str]) -> str:
+    """Names of effects, and words where there is none."""
+    return " + ".join(SAID.get(name, name) for name in hypothesis)
 
 
 def add_article(label: str) -> str:
