@@ -7,12 +7,12 @@ then no answer. Hypotheses that were never simulated, and unknown, have no p_m a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.stats import truncnorm
 
-from ..inference.fitting import Fit
+from ..inference.fitting import Fit, Hypothesis
 from ..records import FloatArray
 from .judge import Verdict
 
@@ -20,9 +20,16 @@ DRAWS = 40_000
 
 
 def average_p_m(
-    verdict: Verdict, nominal: Fit, rivals: Sequence[Fit], p_m_range: tuple[float, float], *, seed: int = 1
+    verdict: Verdict,
+    nominal: Fit,
+    rivals: Sequence[Fit],
+    p_m_range: tuple[float, float],
+    *,
+    sampled: Mapping[Hypothesis, FloatArray] | None = None,
+    seed: int = 1,
 ) -> FloatArray:
-    """Draws of p_m, Pa, (DRAWS,): Gaussians of ln p_m cut at the stated range, shapes of effects included."""
+    """Draws of p_m, Pa, (DRAWS,): from what was ``sampled`` of a hypothesis (Pa), else from a Gaussian of ln p_m cut at the
+    stated range, shapes of effects included."""
     probability = dict(verdict.probabilities)
     fits = [nominal, *rivals]
     weights = np.array([probability.get(fit.hypothesis or ("none",), 0.0) for fit in fits])
@@ -32,6 +39,9 @@ def average_p_m(
     low, high = (math.log(p_m) for p_m in p_m_range)
     draws = []
     for fit, count in zip(fits, rng.multinomial(DRAWS, weights / weights.sum()), strict=True):
+        if sampled is not None and fit.hypothesis in sampled:
+            draws.append(np.log(rng.choice(sampled[fit.hypothesis], size=count)))
+            continue
         mean, sigma = fit.log_p_m_over_shapes
         ends = (low - mean) / sigma, (high - mean) / sigma
         draws.append(truncnorm.rvs(*ends, loc=mean, scale=sigma, size=count, random_state=rng))

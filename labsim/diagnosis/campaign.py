@@ -10,12 +10,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
+from ..inference.calibrate import estimate_scatter, prepare, warn_unused_scans
 from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
-from ..inference.nodes import amplitude_nodes, own_node
+from ..inference.nodes import nodes_around
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
+from ..inference.target import sample_fit
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from .average import average_p_m
@@ -37,7 +38,7 @@ MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for t
 NARROW = 15.0  # the same between effects whose order more runs may change
 MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
 LARGE = 0.5  # of an effect's step
-MOST_MOVED = 2  # times that runs are made at the strength and amplitude itself
+MOST_MOVED = 2  # times that runs are made at the amplitude itself
 MOVED = 0.5  # of its standard deviation, that asks for them once more
 
 
@@ -144,6 +145,12 @@ def diagnose_campaign(
             f"p_m is not measured while the cause is unknown: {math.exp(nominal.log_p_m):.4g} Pa without, "
             f"{math.exp(best.log_p_m):.4g} Pa with the nearest listed cause; neither's interval holds"
         )
+    sampled = {
+        fit.hypothesis: chain.samples("p_m_Pa") for fit, chain in ((nominal, posterior), (best, extended))
+    }
+    averaged = average_p_m(
+        found.verdict, nominal, found.rivals, campaign.p_m_range, sampled=sampled, seed=seed
+    )
     low, high = campaign.p_m_range
     if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
         warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")
@@ -155,7 +162,7 @@ def diagnose_campaign(
         gain=measure_gain(held_nominal, held_best),
         posterior_nominal=posterior,
         posterior_extended=extended,
-        p_m_averaged=average_p_m(found.verdict, nominal, found.rivals, campaign.p_m_range, seed=seed),
+        p_m_averaged=averaged,
         scatter=estimate_scatter(bench, nominal),
         runs_new=store.new,
         runs_reused=store.reused,
@@ -243,15 +250,12 @@ def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list
 
 
 def _settle(bench: Workbench, fit: Fit) -> Fit:
-    """The fit among runs about it, then among runs at its own strength and amplitude too, until these move it no more."""
+    """The fit among runs about it, then among runs at its own amplitude too, until these move it no more."""
     name = fit.hypothesis[0]
     for turn in range(1 + MOST_MOVED):
         if turn > 0:
-            nodes = amplitude_nodes(bench.effects[name], fit.values[name], around=True)
-            nodes.append(float(f"{fit.values[name]:.2g}"))
-            index = own_node(fit.log_p_m)
-            bench.require_base([index])
-            bench.require_changes([(name, amplitude, index) for amplitude in nodes], name)
+            own = float(f"{fit.values[name]:.2g}")
+            bench.require_changes([(name, own, index) for index in nodes_around(fit.log_p_m)], name)
         before = fit
         fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
         moved = abs(fit.values[name] - before.values[name])

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..effects import Parameter, list_effects
+from ..effects import list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
-from ..records import Campaign, FloatArray
+from ..records import Campaign
 from .drop_terms import Terms
 from .fitting import Fit, fit_hypothesis, goodness_of_fit
 from .measure import Measurements, measure
-from .posterior import Posterior, QuadraticResidual, measure_residual, sample
+from .posterior import Posterior
 from .runs import Progress, RunStore
 from .scans import observe_scan
-from .tangents import linearise_at
+from .target import sample_fit
 from .workbench import Workbench, open_workbench
 
 LOST = 1e-6  # p value of a nominal fit that is not believed
@@ -157,124 +157,6 @@ def warn_unused_scans(bench: Workbench) -> list[str]:
             f"of scans {names} only the undisturbed dust and the point spread enter the likelihood, not the compacted zone"
         )
     return lines
-
-
-@dataclass(frozen=True)
-class Target:
-    """The posterior about a fit, up to a constant. names : p_m_Pa and EFFECT.PARAMETER; a point is (ln p_m, amplitudes).
-
-    misfit : (m, d) -> (m,) half the squared whitened residual; log_prior : the same shapes; bounds : (d, 2) of the prior.
-    """
-
-    names: tuple[str, ...]
-    nulls: tuple[float, ...]
-    parameters: tuple[Parameter, ...]
-    misfit: QuadraticResidual
-    bounds: FloatArray
-
-    def log_prior(self, theta: FloatArray) -> FloatArray:
-        low, high = self.bounds[0]
-        inside = (theta[:, 0] >= low) & (theta[:, 0] <= high)
-        total = np.where(inside, -math.log(high - low), -np.inf)
-        for k, parameter in enumerate(self.parameters, start=1):
-            total = total + parameter.log_prior(parameter.null + theta[:, k])
-        return total
-
-    def log_probability(self, theta: FloatArray) -> FloatArray:
-        return self.log_prior(theta) - self.misfit(theta)
-
-    def transform(self, name: str, values: FloatArray) -> FloatArray:
-        """Points as they are reported."""
-        k = self.names.index(name)
-        return np.exp(values) if k == 0 else self.nulls[k - 1] + values
-
-
-def make_target(bench: Workbench, fit: Fit) -> Target:
-    """Flat prior in ln p_m, the effects' own priors, the covariance of the fit."""
-    parameters = tuple(bench.effects[name].amplitudes[0] for name in fit.hypothesis)
-    names = ("p_m_Pa", *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)))
-    centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
-    sigma = np.sqrt(np.diag(fit.covariance))
-
-    def residual(theta: FloatArray) -> FloatArray:
-        values = dict(zip(fit.hypothesis, theta[1:], strict=True))
-        linear = linearise_at(bench, fit.models, fit.scan_speeds, float(theta[0]), values)
-        return np.concatenate(
-            [
-                fitted.whiten(block.residual)
-                for fitted, block in zip(fit.linear.blocks, linear.blocks, strict=True)
-            ]
-        )
-
-    bounds = [[math.log(p) for p in bench.campaign.p_m_range]]
-    bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
-    nulls = tuple(parameter.null for parameter in parameters)
-    return Target(names, nulls, parameters, measure_residual(residual, centre, sigma), np.array(bounds))
-
-
-def sample_fit(
-    bench: Workbench,
-    fit: Fit,
-    *,
-    seed: int = 1,
-    backend: Path | None = None,
-    progress: Progress | None = None,
-) -> Posterior:
-    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors.
-
-    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the other shapes.
-    """
-    target = make_target(bench, fit)
-    posterior = sample(
-        target.log_probability,
-        target.names,
-        np.clip(target.misfit.centre, *target.bounds.T),
-        fit.covariance,
-        seed=seed,
-        transform=target.transform,
-        backend=backend,
-        progress=progress,
-    )
-    moved, width = fit.over_shapes
-    if width > 0.0:
-        p_m = posterior.data.posterior["p_m_Pa"]
-        other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
-        posterior.data.posterior["p_m_Pa"] = p_m * np.exp(other)
-    return posterior
-
-
-def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[float, float]:
-    """ln of the integrated likelihood by nested sampling, and its error: what Laplace's formula in Fit.evidence is checked by.
-
-    Needs dynesty (the extra ``evidence``); Speagle (2020), MNRAS 493, 3132.
-    """
-    try:
-        import dynesty
-    except ImportError:
-        raise InferenceError("", "dynesty", 'is not installed; pip install "labsim[evidence]"') from None
-    target = make_target(bench, fit)
-    low, high = target.bounds[0]
-    cut = [tuple(float(p.prior.cdf(limit)) for limit in p.limits) for p in target.parameters]
-
-    def place(cube: FloatArray) -> FloatArray:
-        point = [low + (high - low) * cube[0]]
-        for u, parameter, (below, above) in zip(cube[1:], target.parameters, cut, strict=True):
-            point.append(float(parameter.prior.ppf(below + (above - below) * u)) - parameter.null)
-        return np.array(point)
-
-    sampler = dynesty.NestedSampler(
-        lambda theta: -float(target.misfit(theta)[0]),
-        place,
-        len(target.names),
-        nlive=400,
-        rstate=np.random.default_rng(seed),
-    )
-    sampler.run_nested(dlogz=0.05, print_progress=False)
-    points = sum(block.residual.size for block in fit.linear.blocks)
-    determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.linear.blocks)
-    constant = -0.5 * (determinant + points * math.log(2 * math.pi))
-    price = sum(bench.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
-    return float(sampler.results.logz[-1]) + constant + price, float(sampler.results.logzerr[-1])
 
 
 def estimate_scatter(bench: Workbench, fit: Fit) -> tuple[float, float]:

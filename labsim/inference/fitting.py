@@ -16,7 +16,7 @@ from ..records import FloatArray
 from .drop_model import DropModel
 from .evidence import integrate_by_laplace
 from .likelihood import Linearised
-from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, screening_node
+from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
 from .steps import Place, Solved, advance, hold, settle_nuisances, solve_at
 from .tangents import linearise_at
 from .workbench import Workbench, find_family
@@ -151,12 +151,16 @@ def _ask(
     around: bool,
 ) -> None:
     bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range))
+    indices: list[float] = [screening_node(log_p_m)] if coarse else [*nearest_nodes(log_p_m)]
+    if around:
+        indices = nodes_around(log_p_m)
+        bench.require_base(indices)
     wanted = [
         (name, amplitude, index)
         for name in hypothesis
         if bench.costs_runs(name)
         for amplitude in amplitude_nodes(bench.effects[name], values[name], coarse=coarse, around=around)
-        for index in ([screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, around=around))
+        for index in indices
     ]
     if wanted:
         bench.require_changes(wanted, " and ".join(hypothesis), coarse=coarse)

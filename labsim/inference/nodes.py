@@ -24,20 +24,22 @@ def enclosing_nodes(log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.
     return [below - 1, below, below + 1, below + 2]
 
 
-def nearest_nodes(log_p_m: float, share: float = 0.3, *, around: bool = False) -> list[int]:
-    """The nearest strength node, and the next one where the value lies well between two; ``around``: both neighbours too."""
+def nearest_nodes(log_p_m: float, share: float = 0.3) -> list[int]:
+    """The nearest strength node, and the next one where the value lies well between two."""
     place = place_strength(log_p_m)
     near = round(place)
-    if around:
-        return [near - 1, near, near + 1]
     if abs(place - near) <= share:
         return [near]
     return [math.floor(place), math.ceil(place)]
 
 
-def own_node(log_p_m: float) -> float:
-    """The quarter of a strength node nearest to a value, for runs where an estimate lies."""
-    return round(4.0 * place_strength(log_p_m)) / 4.0
+def nodes_around(log_p_m: float) -> list[float]:
+    """Three strengths about an estimate, half a node apart, on a grid of their own that estimates share.
+
+    A node apart, what a shear factor of 0.6 adds to the depth is off by 0.2 to 1.7 % of it between them.
+    """
+    near = round(2.0 * place_strength(log_p_m)) / 2.0
+    return [near - 0.5, near, near + 0.5]
 
 
 def screening_node(log_p_m: float) -> int:

@@ -49,10 +49,10 @@ class Posterior:
 
 @dataclass(frozen=True)
 class QuadraticResidual:
-    """w(θ) = w0 + A u + Σ b_jk u_j u_k with u = (θ - centre)/scale: whitened residuals (n,)."""
+    """w(θ) = w0 + A u + Σ b_jk u_j u_k with θ = centre + axes u: whitened residuals (n,). axes : (d, d), one a column."""
 
     centre: FloatArray
-    scale: FloatArray
+    axes: FloatArray
     coefficients: FloatArray  # (terms, n)
 
     @cached_property
@@ -62,7 +62,7 @@ class QuadraticResidual:
 
     def __call__(self, theta: FloatArray) -> FloatArray:
         """(m, d) -> (m,) half the squared length of the residual."""
-        terms = _terms((np.atleast_2d(theta) - self.centre) / self.scale)
+        terms = _terms(np.linalg.solve(self.axes, (np.atleast_2d(theta) - self.centre).T).T)
         return 0.5 * np.sum((terms @ self.gram) * terms, axis=1)
 
 
@@ -74,9 +74,15 @@ def _terms(u: FloatArray) -> FloatArray:
 
 
 def measure_residual(
-    residual: Callable[[FloatArray], FloatArray], centre: FloatArray, sigma: FloatArray
+    residual: Callable[[FloatArray], FloatArray], centre: FloatArray, covariance: FloatArray
 ) -> QuadraticResidual:
-    """Quadratic through the centre, both sides of each axis and one corner of each pair."""
+    """Quadratic through the centre, both sides of each principal axis of the covariance and one corner of each pair.
+
+    Along the axes of parameters that make up for each other the ends would lie far from all that the data allow.
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    widths, directions = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+    axes = sigma[:, None] * directions * np.sqrt(widths)
     d = len(centre)
     u = [np.zeros(d)]
     for k in range(d):
@@ -89,9 +95,9 @@ def measure_residual(
         point[j] = point[k] = REACH / math.sqrt(2)
         u.append(point)
     grid = np.array(u)
-    values = np.array([residual(centre + sigma * row) for row in grid])
+    values = np.array([residual(centre + axes @ row) for row in grid])
     coefficients = np.linalg.lstsq(_terms(grid), values, rcond=None)[0]
-    return QuadraticResidual(centre, sigma, coefficients)
+    return QuadraticResidual(centre, axes, coefficients)
 
 
 def spread_walkers(

@@ -22,7 +22,7 @@ from ..effects import Instrument
 from ..records import FillingMap, FloatArray, Scan
 from ..sph import DropRun
 from .blocks import Block
-from .drop_terms import Probe
+from .drop_terms import Probe, Terms
 from .forward import ResponseTable
 from .undisturbed import GREY, observe_undisturbed
 
@@ -37,8 +37,6 @@ CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes o
 # of φ - φ0 where it is small against its largest: how far the compaction reaches. Two codes approach each other from both sides
 # as they are refined, and differ by 15 to 35 % there under deep beads (docs/numerics.md)
 REACH = 0.2
-# of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
-CHANGE = 0.15
 
 
 @dataclass(frozen=True)
@@ -151,7 +149,7 @@ def linearise_scan(
     log_speed: float,
     log_p_m: float,
     nominal: Probe,
-    scatter: float,
+    terms: Terms,
     probes: Mapping[str, Probe],
 ) -> Block:
     """Residual, covariance and tangents of one scan about the point ``nominal``."""
@@ -186,11 +184,11 @@ def linearise_scan(
     by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
     nuisances = [
         (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * spread,
-        by_strength * math.hypot(scatter, STRENGTH),
+        by_strength * math.hypot(terms.scatter, STRENGTH),
         np.append(here[:n] * GREY, 0.0),
         np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
         np.append(reach, 0.0),
-        np.append(changed * CHANGE, 0.0),
+        np.append(changed * terms.zone_change, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
     pull = (log_speed - model.stated) / spread

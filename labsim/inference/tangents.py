@@ -33,7 +33,7 @@ def linearise_at(
     nominal = _stand(bench, values)
     linear = linearise(models, log_p_m, nominal, bench.terms, probes)
     scans = tuple(
-        linearise_scan(scan, speed, log_p_m, nominal, bench.terms.scatter, probes)
+        linearise_scan(scan, speed, log_p_m, nominal, bench.terms, probes)
         for scan, speed in zip(bench.scans, scan_speeds, strict=True)
     )
     return replace(linear, scans=scans, undisturbed=tuple(_linearise_dust(bench, nominal, probes)))

@@ -177,9 +177,7 @@ def test_globals_are_generalised_least_squares():
 def test_sampler_recovers_a_known_gaussian_and_goes_on_after_a_stop(tmp_path):
     mean, covariance = np.array([0.3, -1.0]), np.array([[0.04, 0.01], [0.01, 0.09]])
     lower = np.linalg.cholesky(covariance)
-    quadratic = measure_residual(
-        lambda theta: np.linalg.solve(lower, theta - mean), mean, np.sqrt(np.diag(covariance))
-    )
+    quadratic = measure_residual(lambda theta: np.linalg.solve(lower, theta - mean), mean, covariance)
     found = sample(
         lambda theta: -quadratic(theta), ["a", "b"], mean, covariance, seed=2, backend=tmp_path / "chain.h5"
     )

@@ -7,7 +7,7 @@ import pytest
 
 from labsim.effects import LogNormal, Parameter
 from labsim.inference.grid import interpolation_weights, smooth_weights, strength_node
-from labsim.inference.nodes import own_node
+from labsim.inference.nodes import nodes_around
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 7])
@@ -36,10 +36,12 @@ def test_the_curve_has_no_jumps_where_the_nearest_nodes_change():
     assert np.abs(np.diff(jumping, 2)).max() > 1e-3
 
 
-def test_an_estimate_has_a_node_within_a_tenth_of_it():
+def test_an_estimate_lies_well_among_the_nodes_around_it():
     for p_m in (310.0, 794.0, 1000.0, 1300.0, 5200.0):
-        assert strength_node(own_node(math.log(p_m))) == pytest.approx(p_m, rel=0.095)
-    assert own_node(math.log(2000.0)) == 1.0
+        below, near, above = (strength_node(index) for index in nodes_around(math.log(p_m)))
+        assert near == pytest.approx(p_m, rel=0.19)
+        assert below < 0.85 * p_m < p_m < 0.85 * above
+    assert nodes_around(math.log(2000.0)) == [0.5, 1.0, 1.5]
 
 
 def test_an_amplitude_at_a_limit_has_a_prior():

@@ -1,0 +1,98 @@
+"""How large the solver's error of what an effect changes is, is not known: it is integrated over.
+
+Codes differ by some share of what an effect changes (Terms.numerical_change, zone_change), in some campaigns by half of it, in
+others by twice. Held at one size, that error tells of the parameters: where p_m and an effect make up for each other the
+change grows along them, so does the error, and the data ask for as much change as brings the error that they show. With ln of
+the size normal about the stated one, SPREAD wide, the same likelihood asks for another size instead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+
+from ..records import FloatArray
+from .blocks import Block
+from .fitting import Fit
+from .tangents import linearise_at
+from .workbench import Workbench
+
+SPREAD = math.log(2.0)
+SIZES = np.linspace(-1.5, 1.5, 7)  # ln of sizes over the stated ones
+PLACES = np.linspace(-6.0, 6.0, 7)  # of ln p_m, in standard deviations of the fit
+
+
+def integrate_sizes(
+    bench: Workbench, fit: Fit, log_probability: Callable[[FloatArray], FloatArray]
+) -> Callable[[FloatArray], FloatArray]:
+    """What the posterior over sizes gains on ``log_probability`` ((m, d) -> (m,)), as a function of ln p_m, (m,) -> (m,).
+
+    Measured where the amplitudes are at their best at each p_m, nought at the fit.
+    """
+    low, high = (math.log(p_m) for p_m in bench.campaign.p_m_range)
+    places = fit.log_p_m + PLACES * math.sqrt(fit.covariance[0, 0])
+    places = np.unique(np.clip(places, low, high))
+    best = np.array([fit.values[name] for name in fit.hypothesis])
+    along = fit.covariance[1:, 0] / fit.covariance[0, 0]
+    sigma = np.sqrt(np.diag(fit.covariance)[1:])
+    limits = [
+        [limit - p.null for limit in p.limits]
+        for p in (bench.effects[n].amplitudes[0] for n in fit.hypothesis)
+    ]
+    gained = []
+    for place in places:
+        near = np.clip(best + along * (place - fit.log_p_m), *np.array(limits).T)
+
+        def lost(u: FloatArray, place: float = place, near: FloatArray = near) -> float:
+            value = float(log_probability(np.concatenate([[place], near + sigma * u])[None])[0])
+            return -value if math.isfinite(value) else 1e30
+
+        options = {
+            "xatol": 1e-2,
+            "fatol": 1e-2,
+            "initial_simplex": np.vstack([np.zeros(best.size), np.eye(best.size)]),
+        }
+        found = minimize(lost, np.zeros(best.size), method="Nelder-Mead", options=options)
+        amplitudes = dict(zip(fit.hypothesis, near + sigma * found.x, strict=True))
+        gained.append(_integrate_likelihood(bench, fit, float(place), amplitudes) + found.fun)
+    if len(places) < 2:
+        return np.zeros_like
+    curve = CubicSpline(places, gained)
+    here = float(curve(np.clip(fit.log_p_m, low, high)))
+    return lambda at: np.asarray(curve(np.clip(at, places[0], places[-1])) - here)
+
+
+def _integrate_likelihood(bench: Workbench, fit: Fit, log_p_m: float, amplitudes: dict[str, float]) -> float:
+    """ln likelihood, over all sizes of the drops' error and, on its own, of the maps'; the prior of the amplitudes with it."""
+    drops, maps = [], []
+    for size in SIZES:
+        terms = replace(
+            bench.terms,
+            numerical_change=bench.terms.numerical_change * math.exp(size),
+            zone_change=bench.terms.zone_change * math.exp(size),
+        )
+        linear = linearise_at(replace(bench, terms=terms), fit.models, fit.scan_speeds, log_p_m, amplitudes)
+        drops.append(_log_likelihood([linear.drops]))
+        maps.append(_log_likelihood(linear.further))
+    prior = 0.0
+    for name, value in amplitudes.items():
+        parameter = bench.effects[name].amplitudes[0]
+        prior += float(parameter.log_prior(parameter.hold(value)))
+    return _over_sizes(drops) + _over_sizes(maps) + prior
+
+
+def _over_sizes(log_likelihood: Sequence[float]) -> float:
+    """ln of the integral over sizes, up to a constant; between those tried the ln likelihood is smooth."""
+    fine = np.linspace(SIZES[0], SIZES[-1], 121)
+    return float(logsumexp(CubicSpline(SIZES, log_likelihood)(fine) - 0.5 * (fine / SPREAD) ** 2))
+
+
+def _log_likelihood(blocks: Sequence[Block]) -> float:
+    """Up to a constant."""
+    return -0.5 * sum(block.chi_square + block.log_determinant for block in blocks)

@@ -1,0 +1,89 @@
+"""The size of the solver's error integrated over: against an independent integral."""
+
+import math
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from labsim.effects import Normal, Parameter
+from labsim.inference import error_sizes
+from labsim.inference.blocks import Block
+from labsim.inference.drop_terms import Terms
+
+MIDDLE, NOISE, POINTS = math.log(1200.0), 0.01, 40
+PARAMETER = Parameter("amount", "1", 0.0, (-10.0, 10.0), Normal(0.0, 2.0), 1.0, "of a test")
+
+
+@dataclass
+class Bench:
+    terms: Terms
+    campaign: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(p_m_range=(300.0, 6000.0)))
+    effects: dict = field(default_factory=lambda: {"effect": SimpleNamespace(amplitudes=[PARAMETER])})
+
+
+def residual(log_p_m, amplitude):
+    """One mode that p_m and the effect share, another that only the effect moves."""
+    x = np.linspace(-1, 1, POINTS)
+    return 0.02 * np.cos(9 * x) - 0.3 * (log_p_m - MIDDLE + amplitude - 0.5) - 0.05 * (amplitude - 0.5) * x
+
+
+def covariance(terms, amplitude):
+    x = np.linspace(-1, 1, POINTS)
+    alike = np.exp(-0.5 * (np.subtract.outer(x, x) / 0.3) ** 2)
+    return NOISE**2 * np.eye(POINTS) + (terms.numerical_change * amplitude) ** 2 * alike
+
+
+def surrogate(theta):
+    """The covariance held at an amplitude of 0.5, as about a fit."""
+    lower = np.linalg.cholesky(covariance(Terms(), 0.5))
+    misfit = [0.5 * np.sum(np.linalg.solve(lower, residual(*point)) ** 2) for point in theta]
+    return PARAMETER.log_prior(theta[:, 1]) - misfit
+
+
+def by_quadrature(log_p_m, amplitude):
+    def density(size):
+        c = covariance(Terms(numerical_change=Terms().numerical_change * math.exp(size)), amplitude)
+        r = residual(log_p_m, amplitude)
+        value = -0.5 * (r @ np.linalg.solve(c, r) + np.linalg.slogdet(c)[1])
+        return math.exp(value - 150.0 - 0.5 * (size / math.log(2.0)) ** 2)
+
+    return math.log(quad(density, -1.5, 1.5, epsrel=1e-8)[0]) + float(PARAMETER.log_prior(amplitude))
+
+
+def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
+    def linearise(bench, models, speeds, log_p_m, values, further=()):
+        amplitude = values["effect"]
+        drops = Block(residual(log_p_m, amplitude), covariance(bench.terms, amplitude), {})
+        return SimpleNamespace(drops=drops, further=[])
+
+    monkeypatch.setattr(error_sizes, "linearise_at", linearise)
+    fit = SimpleNamespace(
+        hypothesis=("effect",),
+        log_p_m=MIDDLE,
+        values={"effect": 0.5},
+        covariance=np.array([[0.05**2, -0.9 * 0.05 * 0.06], [-0.9 * 0.05 * 0.06, 0.06**2]]),
+        models=[],
+        scan_speeds=(),
+    )
+    gained = error_sizes.integrate_sizes(Bench(Terms()), fit, surrogate)
+    assert float(gained(np.array([MIDDLE]))[0]) == pytest.approx(0.0, abs=1e-9)
+    near = np.linspace(0.1, 0.9, 8001)
+
+    def best(log_p_m):
+        points = np.column_stack([np.full(near.size, log_p_m), near])
+        lost = np.array([float(v) for v in surrogate(points[::2])])
+        amplitude = points[::2][int(np.argmax(lost)), 1]
+        return amplitude, float(lost.max())
+
+    base, lost = best(MIDDLE)
+    at_fit = by_quadrature(MIDDLE, base) - lost
+    largest = 0.0
+    for away in (-0.1, 0.1, 0.2):
+        amplitude, lost = best(MIDDLE + away)
+        expected = by_quadrature(MIDDLE + away, amplitude) - lost - at_fit
+        assert float(gained(np.array([MIDDLE + away]))[0]) == pytest.approx(expected, abs=0.1)
+        largest = max(largest, abs(expected))
+    assert largest > 0.5  # there is something to gain
