@@ -13,9 +13,9 @@ from ..errors import ExtrapolationError
 from ..inference.calibrate import estimate_scatter, prepare, warn_unused_scans
 from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
-from ..inference.nodes import nodes_around
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
+from ..inference.settle import list_large, settle
 from ..inference.target import sample_fit
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
@@ -24,7 +24,7 @@ from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, measure_gain, predict_held_out
 from .judge import Verdict, judge
-from .pairs import confirm_pairs, return_to_singles
+from .pairs import confirm_pairs, return_to_singles, settle_leading
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
@@ -37,9 +37,6 @@ MOST_EXPLORED = 3
 MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for the others
 NARROW = 15.0  # the same between effects whose order more runs may change
 MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
-LARGE = 0.5  # of an effect's step
-MOST_MOVED = 2  # times that runs are made at the amplitude itself
-MOVED = 0.5  # of its standard deviation, that asks for them once more
 
 
 @dataclass(frozen=True)
@@ -89,6 +86,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     fits = settle_best(bench, fits, unknown.evidence)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
+    pairs = settle_leading(bench, rivals, pairs, unknown.evidence)
     rivals = return_to_singles(bench, rivals, pairs) + pairs
     if is_wanted(p_value, rivals, unknown.evidence):
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
@@ -233,35 +231,17 @@ def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list
     again: set[str] = set()  # one variant of a cause
     for fit in sorted(fits, key=lambda fit: -fit.evidence):
         name = fit.hypothesis[0]
-        effect = bench.effects[name]
         if (
             len(again) < MOST_SETTLED
             and cause(name) not in again
             and fit.evidence > least
-            and bench.costs_runs(name)
-            and effect.kind != "numerics"
-            and abs(fit.values[name]) > LARGE * abs(effect.amplitudes[0].step)
+            and list_large(bench, fit)
         ):
             again.add(cause(name))
             with suppress(ExtrapolationError):
-                fit = _settle(bench, fit)
+                fit = settle(bench, fit)
         settled.append(fit)
     return settled
-
-
-def _settle(bench: Workbench, fit: Fit) -> Fit:
-    """The fit among runs about it, then among runs at its own amplitude too, until these move it no more."""
-    name = fit.hypothesis[0]
-    for turn in range(1 + MOST_MOVED):
-        if turn > 0:
-            own = float(f"{fit.values[name]:.2g}")
-            bench.require_changes([(name, own, index) for index in nodes_around(fit.log_p_m)], name)
-        before = fit
-        fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
-        moved = abs(fit.values[name] - before.values[name])
-        if turn > 0 and moved < MOVED * math.sqrt(before.covariance[1, 1]):
-            break
-    return fit
 
 
 def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:

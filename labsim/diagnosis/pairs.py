@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ExtrapolationError
 from ..inference.fitting import Fit, Hypothesis, fit_hypothesis
+from ..inference.settle import list_large, settle
 from ..inference.workbench import Workbench
 from .screen import CLOSE, Screening, screen, screen_pairs
 
@@ -55,6 +56,19 @@ def confirm_pairs(
         with suppress(ExtrapolationError):
             fits.append(fit_hypothesis(bench, pair, begin, nuisances=start))
     return fits
+
+
+def settle_leading(
+    bench: Workbench, singles: Sequence[Fit], pairs: Sequence[Fit], without_place: float
+) -> list[Fit]:
+    """The pairs; the best, where it leads all singles, is not far behind ``without_place`` and is large, settled."""
+    best = max(pairs, key=lambda fit: fit.evidence, default=None)
+    least = max([without_place - CLOSE, *(fit.evidence for fit in singles)])
+    if best is None or best.evidence < least or not list_large(bench, best):
+        return list(pairs)
+    with suppress(ExtrapolationError):
+        return [settle(bench, best), *(fit for fit in pairs if fit is not best)]
+    return list(pairs)
 
 
 def return_to_singles(bench: Workbench, singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:

@@ -21,6 +21,7 @@ from .measure import Measurements, measure
 from .posterior import Posterior
 from .runs import Progress, RunStore
 from .scans import observe_scan
+from .settle import list_large, settle
 from .target import sample_fit
 from .workbench import Workbench, open_workbench
 
@@ -127,6 +128,8 @@ def calibrate(
             reason = bench.reasons.get(name, f"is none of {', '.join(sorted(bench.effects))}")
             raise InferenceError(campaign.folder, f"parameter {name}", reason)
     fit = fit_hypothesis(bench, names, (nominal.log_p_m, {})) if names else nominal
+    if list_large(bench, fit):
+        fit = settle(bench, fit)
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = goodness_of_fit(fit)

@@ -74,3 +74,20 @@ def test_a_pair_whose_other_effect_is_absent_says_where_its_single_lies(
     monkeypatch.setattr(pairs, "fit_hypothesis", lambda *_, **__: a_fit(again, {"strength_slope": -0.4}))
     (single,) = pairs.return_to_singles(None, fits, [leading])
     assert single.evidence == expected
+
+
+@pytest.mark.parametrize(
+    ("evidence", "without_place", "large", "settled"),
+    [
+        (60.0, 70.0, True, True),
+        (45.0, 70.0, True, False),  # a single leads
+        (60.0, 95.0, True, False),  # a law without a name is far ahead
+        (60.0, 70.0, False, False),  # nothing of it is large
+    ],
+)
+def test_the_leading_pair_is_settled_where_it_is_large(monkeypatch, evidence, without_place, large, settled):
+    best, other = a_fit(evidence, {"a": 1.0, "b": 1.0}), a_fit(40.0, {"a": 1.0, "c": 1.0})
+    monkeypatch.setattr(pairs, "list_large", lambda *_: ["a"] if large else [])
+    monkeypatch.setattr(pairs, "settle", lambda bench, fit: a_fit(fit.evidence + 5.0, fit.values))
+    found = pairs.settle_leading(None, [a_fit(50.0, {"a": 1.0})], [other, best], without_place)
+    assert sorted(fit.evidence for fit in found) == [40.0, evidence + 5.0 * settled]

@@ -1,0 +1,43 @@
+"""Large effects bend with p_m and with their own amplitude: a fit of one is made once more among runs about itself."""
+
+from __future__ import annotations
+
+import math
+
+from .fitting import Fit, fit_hypothesis
+from .nodes import nodes_around
+from .workbench import Workbench
+
+LARGE = 0.5  # of an effect's step
+MOST_MOVED = 2  # times that runs are made at the amplitude itself
+MOVED = 0.5  # of its standard deviation, that asks for them once more
+
+
+def list_large(bench: Workbench, fit: Fit) -> list[str]:
+    """Effects of a fit that change runs and are larger than LARGE; not those of the numerics, whose runs cost too much."""
+    return [
+        name
+        for name, value in fit.values.items()
+        if bench.costs_runs(name)
+        and bench.effects[name].kind != "numerics"
+        and abs(value) > LARGE * abs(bench.effects[name].amplitudes[0].step)
+    ]
+
+
+def settle(bench: Workbench, fit: Fit) -> Fit:
+    """The fit among runs about it, then among runs at its own large amplitudes too, until these move it no more."""
+    text = " and ".join(fit.hypothesis)
+    for turn in range(1 + MOST_MOVED):
+        if turn > 0:
+            own = {name: float(f"{fit.values[name]:.2g}") for name in list_large(bench, fit)}
+            indices = nodes_around(fit.log_p_m)
+            bench.require_changes([(name, own[name], index) for name in own for index in indices], text)
+        before = fit
+        fit = fit_hypothesis(bench, fit.hypothesis, (fit.log_p_m, fit.values), around=True, nuisances=fit)
+        moved = [
+            abs(fit.values[name] - before.values[name]) / math.sqrt(before.covariance[k, k])
+            for k, name in enumerate(fit.hypothesis, start=1)
+        ]
+        if turn > 0 and max(moved) < MOVED:
+            break
+    return fit
