@@ -29,7 +29,7 @@ from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
 
-HALF = 0.5  # of the best, if that is more, where nothing explores further: large effects are not what the screening says
+HALF = 0.5  # of the best gain, if that is less than CLOSE asks: large effects are not what screening or fingerprints say
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
@@ -82,7 +82,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     explored: dict[str, Fit] = {}
     if is_open(bench, nominal, fits, screening):
         explored = explore(bench, nominal, screening, fits)
-        fits = confirm_explored(bench, nominal, fits, explored)
+        fits = confirm_explored(bench, nominal, fits, explored, unknown.evidence)
     fits = settle_best(bench, fits, unknown.evidence)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
@@ -204,17 +204,24 @@ def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> lis
     return fits
 
 
-def confirm_explored(bench: Workbench, nominal: Fit, fits: list[Fit], explored: dict[str, Fit]) -> list[Fit]:
-    """The fits with those joined, or replaced, that start from the best of exploring."""
+def confirm_explored(
+    bench: Workbench, nominal: Fit, fits: list[Fit], explored: dict[str, Fit], without_place: float
+) -> list[Fit]:
+    """The fits with those joined, or replaced, that start from the best of exploring.
+
+    One that gains less than HALF of what a law without a name (``without_place``, its ln evidence) does is not worth finer runs.
+    """
     known = {fit.hypothesis[0]: fit for fit in fits}
     top = max([nominal.evidence, *(fit.evidence for fit in [*fits, *explored.values()])])
+    worth = nominal.evidence + HALF * (without_place - nominal.evidence)
     ranked = sorted(explored, key=lambda name: -explored[name].evidence)
     for name in [name for name in ranked if explored[name].evidence > top - ROUGH][:MOST_EXPLORED]:
-        start = explored[name]
-        try:
-            fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
-        except ExtrapolationError:
-            continue
+        fit = start = explored[name]
+        if start.evidence > worth:
+            try:
+                fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
+            except ExtrapolationError:
+                continue
         if name not in known or fit.evidence > known[name].evidence:
             known[name] = fit
     return list(known.values())
