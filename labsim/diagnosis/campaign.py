@@ -140,8 +140,8 @@ def diagnose_campaign(
     warnings += warn_unused_scans(bench)
     if found.verdict.word == "unknown":
         warnings.append(
-            f"p_m is not measured while the cause is unknown: {math.exp(nominal.log_p_m):.4g} Pa without, "
-            f"{math.exp(best.log_p_m):.4g} Pa with the nearest listed cause; neither's interval holds"
+            f"p_m is not measured while the cause is unknown: {np.median(posterior.samples('p_m_Pa')):.4g} Pa without, "
+            f"{np.median(extended.samples('p_m_Pa')):.4g} Pa with the nearest listed cause; neither's interval holds"
         )
     sampled = {
         fit.hypothesis: chain.samples("p_m_Pa") for fit, chain in ((nominal, posterior), (best, extended))
