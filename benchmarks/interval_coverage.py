@@ -16,11 +16,10 @@ import numpy as np
 import pandas as pd
 from own_campaigns import append_rows, interval, open_campaign, read_rows
 
-from labsim.inference.calibrate import prepare
+from labsim.inference.calibrate import prepare, sample_fit
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import measure_hidden
-from labsim.inference.target import sample_fit
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign
 

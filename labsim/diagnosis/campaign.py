@@ -10,13 +10,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..inference.calibrate import estimate_scatter, prepare, warn_unused_scans
+from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
 from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.settle import list_large, settle
-from ..inference.target import sample_fit
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from .average import average_p_m

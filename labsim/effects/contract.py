@@ -193,11 +193,6 @@ class Effect:
         full = self.at(values)
         return bool(self.amplitudes) and all(full[each.name] == each.null for each in self.amplitudes)
 
-    def hold(self, amplitude: float) -> float:
-        """null plus an amplitude, kept inside the limits: null plus what is left to a limit may round beyond it."""
-        low, high = self.limits
-        return min(max(self.null + amplitude, low), high)
-
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """All parameters from their priors."""
         return {parameter.name: parameter.draw(rng) for parameter in self.parameters}

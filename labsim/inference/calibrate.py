@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +16,14 @@ from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign
 from .drop_terms import Terms
+from .error_sizes import integrate_sizes
 from .fitting import Fit, fit_hypothesis, goodness_of_fit
 from .measure import Measurements, measure
-from .posterior import Posterior
+from .posterior import Posterior, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
 from .settle import list_large, settle
-from .target import sample_fit
+from .target import make_target
 from .workbench import Workbench, open_workbench
 
 LOST = 1e-6  # p value of a nominal fit that is not believed
@@ -160,6 +161,39 @@ def warn_unused_scans(bench: Workbench) -> list[str]:
             f"of scans {names} only the undisturbed dust and the point spread enter the likelihood, not the compacted zone"
         )
     return lines
+
+
+def sample_fit(
+    bench: Workbench,
+    fit: Fit,
+    *,
+    seed: int = 1,
+    backend: Path | None = None,
+    progress: Progress | None = None,
+) -> Posterior:
+    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors.
+
+    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the other shapes.
+    """
+    target = make_target(bench, fit)
+    if any(bench.costs_runs(name) for name in fit.hypothesis):
+        target = replace(target, sizes=integrate_sizes(bench, fit, target))
+    posterior = sample(
+        target.log_probability,
+        target.names,
+        np.clip(target.misfit.centre, *target.bounds.T),
+        fit.covariance,
+        seed=seed,
+        transform=target.transform,
+        backend=backend,
+        progress=progress,
+    )
+    moved, width = fit.over_shapes
+    if width > 0.0:
+        p_m = posterior.data.posterior["p_m_Pa"]
+        other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
+        posterior.data.posterior["p_m_Pa"] = p_m * np.exp(other)
+    return posterior
 
 
 def estimate_scatter(bench: Workbench, fit: Fit) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from ..records import FloatArray
 from .blocks import Block
 from .fitting import Fit
 from .tangents import linearise_at
+from .target import Target
 from .workbench import Workbench
 
 SPREAD = math.log(2.0)
@@ -28,48 +29,43 @@ SIZES = np.linspace(-1.5, 1.5, 7)  # ln of sizes over the stated ones
 PLACES = np.linspace(-6.0, 6.0, 7)  # of ln p_m, in standard deviations of the fit
 
 
-def integrate_sizes(
-    bench: Workbench, fit: Fit, log_probability: Callable[[FloatArray], FloatArray]
-) -> Callable[[FloatArray], FloatArray]:
-    """What the posterior over sizes gains on ``log_probability`` ((m, d) -> (m,)), as a function of ln p_m, (m,) -> (m,).
+def integrate_sizes(bench: Workbench, fit: Fit, target: Target) -> Callable[[FloatArray], FloatArray]:
+    """What the posterior over sizes gains on ``target``, as a function of ln p_m, (m,) -> (m,).
 
     Measured where the amplitudes are at their best at each p_m, nought at the fit.
     """
-    low, high = (math.log(p_m) for p_m in bench.campaign.p_m_range)
-    places = fit.log_p_m + PLACES * math.sqrt(fit.covariance[0, 0])
-    places = np.unique(np.clip(places, low, high))
+    (low, high), *limits = target.bounds
+    places = np.unique(np.clip(fit.log_p_m + PLACES * math.sqrt(fit.covariance[0, 0]), low, high))
+    if len(places) < 2:
+        return np.zeros_like
     best = np.array([fit.values[name] for name in fit.hypothesis])
     along = fit.covariance[1:, 0] / fit.covariance[0, 0]
     sigma = np.sqrt(np.diag(fit.covariance)[1:])
-    limits = [
-        [limit - p.null for limit in p.limits]
-        for p in (bench.effects[n].amplitudes[0] for n in fit.hypothesis)
-    ]
+    options = {
+        "xatol": 1e-2,
+        "fatol": 1e-2,
+        "initial_simplex": np.vstack([np.zeros(best.size), np.eye(best.size)]),
+    }
     gained = []
     for place in places:
-        near = np.clip(best + along * (place - fit.log_p_m), *np.array(limits).T)
+        near = np.clip(best + along * (place - fit.log_p_m), *np.transpose(limits))
 
         def lost(u: FloatArray, place: float = place, near: FloatArray = near) -> float:
-            value = float(log_probability(np.concatenate([[place], near + sigma * u])[None])[0])
+            value = float(target.log_probability(np.array([[place, *(near + sigma * u)]]))[0])
             return -value if math.isfinite(value) else 1e30
 
-        options = {
-            "xatol": 1e-2,
-            "fatol": 1e-2,
-            "initial_simplex": np.vstack([np.zeros(best.size), np.eye(best.size)]),
-        }
         found = minimize(lost, np.zeros(best.size), method="Nelder-Mead", options=options)
-        amplitudes = dict(zip(fit.hypothesis, near + sigma * found.x, strict=True))
-        gained.append(_integrate_likelihood(bench, fit, float(place), amplitudes) + found.fun)
-    if len(places) < 2:
-        return np.zeros_like
+        amplitudes = near + sigma * found.x
+        kept = -float(target.misfit(np.array([[place, *amplitudes]]))[0])
+        values = dict(zip(fit.hypothesis, amplitudes, strict=True))
+        gained.append(_integrate_likelihood(bench, fit, float(place), values) - kept)
     curve = CubicSpline(places, gained)
     here = float(curve(np.clip(fit.log_p_m, low, high)))
     return lambda at: np.asarray(curve(np.clip(at, places[0], places[-1])) - here)
 
 
 def _integrate_likelihood(bench: Workbench, fit: Fit, log_p_m: float, amplitudes: dict[str, float]) -> float:
-    """ln likelihood, over all sizes of the drops' error and, on its own, of the maps'; the prior of the amplitudes with it."""
+    """ln likelihood, over all sizes of the drops' error and, on its own, of the maps'; up to a constant."""
     drops, maps = [], []
     for size in SIZES:
         terms = replace(
@@ -80,11 +76,7 @@ def _integrate_likelihood(bench: Workbench, fit: Fit, log_p_m: float, amplitudes
         linear = linearise_at(replace(bench, terms=terms), fit.models, fit.scan_speeds, log_p_m, amplitudes)
         drops.append(_log_likelihood([linear.drops]))
         maps.append(_log_likelihood(linear.further))
-    prior = 0.0
-    for name, value in amplitudes.items():
-        parameter = bench.effects[name].amplitudes[0]
-        prior += float(parameter.log_prior(parameter.hold(value)))
-    return _over_sizes(drops) + _over_sizes(maps) + prior
+    return _over_sizes(drops) + _over_sizes(maps)
 
 
 def _over_sizes(log_likelihood: Sequence[float]) -> float:

@@ -16,6 +16,7 @@ from .tangents import linearise_at
 from .workbench import Workbench
 
 SETTLED = 0.02  # of a standard deviation
+CALM = 0.05  # move of nuisances, as move_nuisances counts it
 BEYOND = 0.7  # of ln p_m, how far outside its range an estimate may stray
 
 
@@ -63,12 +64,9 @@ def solve_at(bench: Workbench, place: Place) -> Solved:
 def settle_nuisances(bench: Workbench, here: Solved, most: int) -> Solved:
     """The same with the nuisances moved to their best there, ``most`` times."""
     for _ in range(most):
-        place = here.place
-        models, speeds = [replace(model) for model in place.models], list(place.speeds)
-        weighted = [block.solve(block.residual) for block in here.linear.blocks]
-        shift = move_nuisances(bench, models, speeds, here.linear, weighted)
-        here = solve_at(bench, replace(place, models=models, speeds=tuple(speeds)))
-        if shift < 0.05:
+        place, shift = _follow(bench, here, here.place.log_p_m, here.place.values)
+        here = solve_at(bench, place)
+        if shift < CALM:
             break
     return here
 
@@ -84,6 +82,13 @@ def advance(bench: Workbench, here: Solved, share: float) -> tuple[Place, bool]:
     for k, (name, before) in enumerate(place.values.items(), start=1):
         values[name] = hold(bench, name, before + float(moved[k]))
         apart.append(abs(values[name] - before) / math.sqrt(here.covariance[k, k]))
+    there, shift = _follow(bench, here, log_p_m, values)
+    return there, max(apart) < SETTLED and shift < CALM
+
+
+def _follow(bench: Workbench, here: Solved, log_p_m: float, values: dict[str, float]) -> tuple[Place, float]:
+    """The place at other globals, its nuisances at what is best with them as seen from here, and how far these moved."""
+    place = here.place
     models, speeds = [replace(model) for model in place.models], list(place.speeds)
     taken = {"ln_p_m": log_p_m - place.log_p_m}
     taken |= {name: values[name] - before for name, before in place.values.items()}
@@ -92,7 +97,7 @@ def advance(bench: Workbench, here: Solved, share: float) -> tuple[Place, bool]:
         change = sum(part * block.tangents[name] for name, part in taken.items())
         weighted.append(block.solve(block.residual - change))
     shift = move_nuisances(bench, models, speeds, here.linear, weighted)
-    return Place(log_p_m, values, models, tuple(speeds)), max(apart) < SETTLED and shift < 0.05
+    return Place(log_p_m, values, models, tuple(speeds)), shift
 
 
 def move_nuisances(

@@ -1,21 +1,18 @@
-"""The posterior about a fit as a function that is quick to evaluate, and what is made of it: samples, an evidence."""
+"""The posterior about a fit as a function that is quick to evaluate, and its integral by nested sampling."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..effects import Parameter
 from ..errors import InferenceError
 from ..records import FloatArray
-from .error_sizes import integrate_sizes
 from .fitting import Fit
-from .posterior import Posterior, QuadraticResidual, measure_residual, sample
-from .runs import Progress
+from .posterior import QuadraticResidual, measure_residual
 from .tangents import linearise_at
 from .workbench import Workbench
 
@@ -54,7 +51,7 @@ class Target:
 
 
 def make_target(bench: Workbench, fit: Fit) -> Target:
-    """Flat prior in ln p_m, the effects' own priors; the covariance of the fit, but for what `error_sizes` says of it."""
+    """Flat prior in ln p_m, the effects' own priors, the covariance of the fit."""
     parameters = tuple(bench.effects[name].amplitudes[0] for name in fit.hypothesis)
     names = ("p_m_Pa", *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)))
     centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
@@ -73,41 +70,7 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
     bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
     nulls = tuple(parameter.null for parameter in parameters)
     misfit = measure_residual(residual, centre, fit.covariance)
-    target = Target(names, nulls, parameters, misfit, np.array(bounds))
-    if not any(bench.costs_runs(name) for name in fit.hypothesis):
-        return target
-    return replace(target, sizes=integrate_sizes(bench, fit, target.log_probability))
-
-
-def sample_fit(
-    bench: Workbench,
-    fit: Fit,
-    *,
-    seed: int = 1,
-    backend: Path | None = None,
-    progress: Progress | None = None,
-) -> Posterior:
-    """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors.
-
-    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the other shapes.
-    """
-    target = make_target(bench, fit)
-    posterior = sample(
-        target.log_probability,
-        target.names,
-        np.clip(target.misfit.centre, *target.bounds.T),
-        fit.covariance,
-        seed=seed,
-        transform=target.transform,
-        backend=backend,
-        progress=progress,
-    )
-    moved, width = fit.over_shapes
-    if width > 0.0:
-        p_m = posterior.data.posterior["p_m_Pa"]
-        other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
-        posterior.data.posterior["p_m_Pa"] = p_m * np.exp(other)
-    return posterior
+    return Target(names, nulls, parameters, misfit, np.array(bounds))
 
 
 def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.free_law import EMBEDDED, RecoveredLaw
+from .page import show_number
 
 MISSING = {
     "depth and speed": "a law of depth and speed, about {size} % of the depth",
@@ -41,9 +42,9 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
         law = _rank(found)[0]
         value, sigma = clearest(law)[1:]
         if law.law.over == "filling factor":
-            size = f"{100 * value:+.0f} ± {100 * sigma:.0f} %"
-            return size.replace("-", "−"), f"of the strength {_say_place(law)}"
-        return f"{value:+.0f} ± {sigma:.0f} Pa".replace("-", "−"), f"on the tip {_say_place(law)}"
+            size = show_number(100 * value, "{:+.0f}")
+            return f"{size} ± {100 * sigma:.0f} %", f"of the strength {_say_place(law)}"
+        return f"{show_number(value, '{:+.0f}')} ± {sigma:.0f} Pa", f"on the tip {_say_place(law)}"
     if "depth" in MISSING[found.unknown.block]:
         return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"
     return None

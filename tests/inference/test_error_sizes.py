@@ -1,7 +1,7 @@
 """The size of the solver's error integrated over: against an independent integral."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,8 +20,6 @@ PARAMETER = Parameter("amount", "1", 0.0, (-10.0, 10.0), Normal(0.0, 2.0), 1.0, 
 @dataclass
 class Bench:
     terms: Terms
-    campaign: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(p_m_range=(300.0, 6000.0)))
-    effects: dict = field(default_factory=lambda: {"effect": SimpleNamespace(amplitudes=[PARAMETER])})
 
 
 def residual(log_p_m, amplitude):
@@ -36,11 +34,14 @@ def covariance(terms, amplitude):
     return NOISE**2 * np.eye(POINTS) + (terms.numerical_change * amplitude) ** 2 * alike
 
 
-def surrogate(theta):
+def misfit(theta):
     """The covariance held at an amplitude of 0.5, as about a fit."""
     lower = np.linalg.cholesky(covariance(Terms(), 0.5))
-    misfit = [0.5 * np.sum(np.linalg.solve(lower, residual(*point)) ** 2) for point in theta]
-    return PARAMETER.log_prior(theta[:, 1]) - misfit
+    return np.array([0.5 * np.sum(np.linalg.solve(lower, residual(*point)) ** 2) for point in theta])
+
+
+def surrogate(theta):
+    return PARAMETER.log_prior(theta[:, 1]) - misfit(theta)
 
 
 def by_quadrature(log_p_m, amplitude):
@@ -68,7 +69,9 @@ def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
         models=[],
         scan_speeds=(),
     )
-    gained = error_sizes.integrate_sizes(Bench(Terms()), fit, surrogate)
+    bounds = np.array([np.log([300.0, 6000.0]), PARAMETER.limits])
+    target = SimpleNamespace(log_probability=surrogate, misfit=misfit, bounds=bounds)
+    gained = error_sizes.integrate_sizes(Bench(Terms()), fit, target)
     assert float(gained(np.array([MIDDLE]))[0]) == pytest.approx(0.0, abs=1e-9)
     near = np.linspace(0.1, 0.9, 8001)
 
