@@ -147,11 +147,10 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
 
 
 def say_verdict(found: Diagnosis) -> str:
-    """The verdict as one sentence that a laboratory can act on."""
+    """The verdict as one sentence that a laboratory can act on; numbers are medians of the posteriors."""
     best, probability = found.verdict.probabilities[0]
-    p_m = math.exp(found.best.log_p_m_over_shapes[0]) / 1e3
+    nominal = np.median(found.posterior_nominal.samples("p_m_Pa")) / 1e3
     if found.verdict.word == "none":
-        nominal = math.exp(found.nominal.log_p_m) / 1e3
         return (
             f"The nominal simulation explains these data at p_m = {nominal:.2f} kPa "
             f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
@@ -165,17 +164,19 @@ def say_verdict(found: Diagnosis) -> str:
     for name in best:
         effect = found.bench.effects[name]
         parameter = effect.amplitudes[0]
-        value = parameter.null + found.best.values.get(name, 0.0)
-        amount = say_amount(parameter, value)
+        amount = say_amount(
+            parameter, float(np.median(found.posterior_extended.samples(f"{name}.{parameter.name}")))
+        )
         for shape in (each for each in effect.parameters if each.shape):  # eta s^n says nothing without n
             amount += f", {shape.name} = {say_amount(shape, shape.null)}"
         title = effect.title[0].lower() + effect.title[1:]
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in found.verdict.named[1:])
     hardly = f" (these data hardly tell it from {apart})" if apart else ""
+    p_m = np.median(found.posterior_extended.samples("p_m_Pa")) / 1e3
     return (
         f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}{hardly}; with "
-        f"{' + '.join(best)} p_m is {p_m:.2f} kPa instead of {math.exp(found.nominal.log_p_m) / 1e3:.2f} kPa, and "
+        f"{' + '.join(best)} p_m is {p_m:.2f} kPa instead of {nominal:.2f} kPa, and "
         f"{say_gain(found.gain)}."
     )
 
