@@ -1,10 +1,11 @@
 """What a hidden effect changes of the depth, by labsim's solver and by the material points: by how much do two codes differ?
 
-    OMP_NUM_THREADS=1 python benchmarks/material_points/compare_changes.py FOLDER [--cells 5]
+    OMP_NUM_THREADS=1 python benchmarks/material_points/compare_changes.py FOLDER [--cells 5] [--rows ROWS.csv]
 
 FOLDER holds campaigns of make_campaigns.py and their truth.json. Every drop is run by labsim at its true speed and its sample's
-own p_m, with what is hidden and without. On the campaigns with nothing hidden the two codes differ by a smooth function of speed,
-size, mass and p_m, which is fitted; what the others differ by beyond it is the error of what the effect changes.
+own p_m, with what is hidden and without; ROWS.csv keeps that. On the campaigns with nothing hidden the two codes differ by a
+parabola in ln(depth over tip radius), which is fitted; what others differ by beyond it is the error of what the effect changes.
+Then the ln likelihood of all differences, with the solver's errors that labsim's likelihood has, for several sizes of these.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +22,24 @@ import pandas as pd
 
 from labsim.campaign import read_campaign
 from labsim.effects import Effect, list_effects
+from labsim.inference.drop_terms import USUAL_DEPTH, NumericalError, Terms
 from labsim.inference.grid import DEFAULT_CELLS, set_nominal_drop
+from labsim.inference.likelihood import numerical_covariance
 from labsim.sph import DropSetting, simulate
+
+DEPTH_BY_STRENGTH = -0.3  # d ln D / d ln p_m
+LEFT = 0.002  # of the depth: lattice, interpolation of the stop
+TRIED = {
+    "as they are": {},
+    "numerical 0.4 %": {"numerical": 0.004},
+    "numerical 0.8 %": {"numerical": 0.008},
+    "slope 0.5 %": {"numerical_slope": 0.005},
+    "slope 2 %": {"numerical_slope": 0.02},
+    "change 1.5 %": {"numerical_change": 0.015},
+    "change 5 %": {"numerical_change": 0.05},
+    "contact 0.75 %": {"contact_offset": 0.0075},
+    "contact 3 %": {"contact_offset": 0.03},
+}
 
 # word of truth.json -> the effect whose amplitude it is
 HIDDEN = {
@@ -68,6 +87,7 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
                 "hidden": " + ".join(f"{name} {value:g}" for name, value in hidden.items()) or "nothing",
                 "off": math.log(depth / true["true_depth"]),
                 "change": change,
+                "reach": math.log(true["true_depth"] / drop.projectile.tip_radius),
                 "froude": math.log(true["true_v0"] / math.sqrt(drop.projectile.tip_radius / 0.5e-3)),
                 "size": math.log(drop.projectile.tip_radius / 0.5e-3),
                 "mass": math.log(drop.projectile.mass / drop.projectile.tip_radius**3 / 1.064e4),
@@ -77,28 +97,51 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
     return rows
 
 
-def fit_nominal(rows: pd.DataFrame) -> np.ndarray:
-    """How far the two codes differ with nothing hidden, at all rows."""
-    f, z = rows.froude, rows.strength
-    design = np.column_stack([np.ones(len(rows)), f, f**2, rows["size"], rows.mass, z, f * z, f * rows.mass])
+def fit_nominal(rows: pd.DataFrame, by: str = "reach") -> np.ndarray:
+    """How far the two codes differ with nothing hidden, at all rows: a parabola."""
+    design = np.vander(rows[by], 3)
     plain = (rows.hidden == "nothing").to_numpy()
     best = np.linalg.lstsq(design[plain], rows.off[plain], rcond=None)[0]
-    return design @ best
+    return np.asarray(design @ best)
 
 
-def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    options.add_argument("folder", type=Path)
-    options.add_argument("--cells", type=float, default=DEFAULT_CELLS)
-    chosen = options.parse_args()
-    rows = []
-    for name, truth in json.loads((chosen.folder / "truth.json").read_text()).items():
-        hidden = read_hidden(truth)
-        if hidden is not None:
-            rows += run_campaign(chosen.folder / name, truth, hidden, chosen.cells)
-    table = pd.DataFrame(rows)
-    table["left"] = 100 * (table.off - fit_nominal(table))
-    table["change"] *= 100
+def log_likelihood(rows: pd.DataFrame, terms: Terms, by: str) -> float:
+    """Of the differences of the depths, of all campaigns together; by : what drops are alike by, reach or froude."""
+    total = 0.0
+    for _, drops in rows.groupby("campaign"):
+        changed = 1.0 - np.exp(-drops.change.to_numpy())
+        size = np.hypot(terms.numerical, terms.numerical_change * changed)
+        parts = [
+            NumericalError(np.array([s]), np.ones(1), x, r, m)
+            for s, x, r, m in zip(size, drops[by], drops["size"], drops.mass, strict=True)
+        ]
+        usual = (
+            USUAL_DEPTH
+            if by == "reach"
+            else float(np.interp(USUAL_DEPTH, *_sorted(drops, "reach", "froude")))
+        )
+        shared = np.column_stack(
+            [
+                (drops[by] - usual) * terms.numerical_slope,
+                np.exp(-drops.reach) * terms.contact_offset,
+                np.full(len(drops), DEPTH_BY_STRENGTH * terms.numerical_strength),
+            ]
+        )
+        covariance = numerical_covariance(parts) + shared @ shared.T + LEFT**2 * np.eye(len(drops))
+        lower = np.linalg.cholesky(covariance)
+        white = np.linalg.solve(lower, drops.off.to_numpy())
+        total -= 0.5 * float(white @ white) + float(np.log(np.diag(lower)).sum())
+    return total
+
+
+def _sorted(rows: pd.DataFrame, *names: str) -> tuple[np.ndarray, ...]:
+    ordered = rows.sort_values(names[0])
+    return tuple(ordered[name].to_numpy() for name in names)
+
+
+def tabulate(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row a campaign, in % of the depth."""
+    table = rows.assign(left=100 * (rows.off - fit_nominal(rows)), change=100 * rows.change)
     grouped = table.groupby(["hidden", "campaign"])
     result = grouped.agg(
         drops=("left", "size"),
@@ -109,7 +152,48 @@ def main() -> None:
     )
     change = grouped.change.agg(lambda change: float(np.sqrt(np.mean(change**2))))
     result["share"] = (result.rms / change.where(change > 0.0)).round(3)
-    print(result.round(2).to_string())
+    return result
+
+
+def compare_sizes(rows: pd.DataFrame, tried: Mapping[str, Mapping[str, float]]) -> str:
+    """ln likelihood less that of the sizes as they are."""
+    without_gas = rows[~rows.hidden.str.contains("pore_gas")]
+    least = log_likelihood(without_gas, Terms(), "reach")
+    lines = [
+        f"{'alike by speed over root of radius':36s}{log_likelihood(without_gas, Terms(), 'froude') - least:+9.1f}"
+    ]
+    for name, sizes in tried.items():
+        lines.append(
+            f"{name:36s}{log_likelihood(without_gas, replace(Terms(), **sizes), 'reach') - least:+9.1f}"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    options.add_argument("folder", type=Path)
+    options.add_argument("--cells", type=float, default=DEFAULT_CELLS)
+    options.add_argument("--rows", type=Path, help="kept here; taken from here where it exists")
+    chosen = options.parse_args()
+    if chosen.rows and chosen.rows.exists():
+        rows = pd.read_csv(chosen.rows)
+    else:
+        found = []
+        for name, truth in json.loads((chosen.folder / "truth.json").read_text()).items():
+            hidden = read_hidden(truth)
+            if hidden is not None:
+                found += run_campaign(chosen.folder / name, truth, hidden, chosen.cells)
+        rows = pd.DataFrame(found)
+        if chosen.rows:
+            rows.to_csv(chosen.rows, index=False)
+    print(tabulate(rows).round(2).to_string())
+    plain = rows[rows.hidden == "nothing"]
+    for by in ("reach", "froude"):
+        left = plain.off - fit_nominal(plain, by)
+        print(
+            f"nothing hidden, left by a parabola in {by}: {100 * float(np.sqrt(np.mean(left**2))):.2f} % rms"
+        )
+    print(compare_sizes(rows, TRIED))
 
 
 if __name__ == "__main__":

@@ -15,8 +15,7 @@ from .drop_model import FREE, SPEED_WIDTH, DropModel
 from .observe import STANDARD_GRAVITY
 
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
-# ln of speed over root of gravity and radius, where p_m makes up for all of the solver's error
-USUAL_SWIFTNESS = 1.85
+USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error
 MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
 LEAST_SCATTER = 1e-9
 
@@ -29,12 +28,12 @@ class Terms:
     pixel_scale: float = 0.001  # relative, common to all drops of one camera setting, where nothing is stated
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
-    numerical: float = 0.004  # of the depth, smooth
+    numerical: float = 0.005  # of the depth, smooth
     numerical_change: float = 0.03  # of what an effect changes of the depth, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
     numerical_strength: float = 0.02  # of ln p_m, common to all drops
-    numerical_slope: float = 0.01  # of the depth, per e-fold of speed over √radius, common to all drops
+    numerical_slope: float = 0.01  # of the depth, per e-fold of depth over tip radius, common to all drops
     heights: bool = True
 
 
@@ -50,12 +49,12 @@ class Probe(NamedTuple):
 
 @dataclass(frozen=True)
 class NumericalError:
-    """The solver's error of one drop. size : (n,) m; fraction : (n,) of the time to the stop; drops are alike by froude (ln of
-    speed over √radius), radius and mass (logarithms)."""
+    """The solver's error of one drop. size : (n,) m; fraction : (n,) of the time to the stop; drops are alike by reach (ln of
+    final depth over tip radius), radius and mass (logarithms)."""
 
     size: FloatArray
     fraction: FloatArray
-    froude: float
+    reach: float
     radius: float
     mass: float
 
@@ -113,15 +112,16 @@ def linearise_drop(
         return (model.predict(code, changed, instant) - here) / 1e-3
 
     camera = f"{observed.pixel:.6g} {model.camera.frame_rate:.6g}"
-    # two codes part slowly from slow to fast drops: the one is too deep at one end, too shallow at the other
-    swift = instant.log_speed - 0.5 * math.log(STANDARD_GRAVITY * model.radius) - USUAL_SWIFTNESS
+    # two codes part slowly from shallow to deep drops: the one is too deep at one end, too shallow at the other. Depth counts in
+    # tip radii, thus in spacings: with it, drops of all sizes, speeds and hidden effects lie on one curve, with speed they do not
+    reach = float(code[0]) - math.log(model.radius)
     larger = instrument.replace(pixel_factor=instrument.pixel_factor * 1.001)
     quicker = instrument.replace(rate_factor=instrument.rate_factor * 1.001)
     shared = {
         f"pixel {camera}": differ(larger) * terms.pixel_scale,
         f"frame {camera}": differ(quicker) * terms.frame_scale,
         "contact offset": np.full(n, terms.contact_offset * model.radius),
-        "numerical slope": np.maximum(here, 0.0) * swift * terms.numerical_slope,
+        "numerical slope": np.maximum(here, 0.0) * (reach - USUAL_DEPTH) * terms.numerical_slope,
         "numerical strength": by_strength * terms.numerical_strength,
     }
 
@@ -132,7 +132,7 @@ def linearise_drop(
     numerical = NumericalError(
         np.hypot(reached * terms.numerical, (here - plain) * terms.numerical_change),
         np.clip(clock / stop, 0.0, 1.0),
-        instant.log_speed - 0.5 * math.log(model.radius),
+        reach,
         math.log(model.radius),
         math.log(mass.mass / model.radius**3),
     )

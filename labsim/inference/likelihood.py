@@ -3,7 +3,7 @@
     y = prediction(globals, nuisances) + noise,  covariance C = blocks of
         localisation (white, from the track), contact time (free), impact speed (free, tied to the stated height),
         surface row (stated), pixel and frame scale (stated or SCALE_SIGMA), sample scatter of ln p_m and stated mass error
-        (a random ln p_m per drop), numerical error of the solver (smooth over fraction of the stop, speed and size).
+        (a random ln p_m per drop), numerical error of the solver (smooth over fraction of the stop, depth and size).
 
 Nuisances enter linearly about their current best values and are integrated out; globals (ln p_m, amplitudes) are
 solved for by Gauss-Newton. Each term has a switch in Terms. Formulas: docs/inference.md.
@@ -78,7 +78,7 @@ def linearise(
 
 def _add_errors(parts: Sequence[DropTerms], sections: Sequence[slice]) -> FloatArray:
     """Covariance (n, n) of all drops: each one's own, what they share, the solver's."""
-    covariance = _numerical_covariance([part.numerical for part in parts])
+    covariance = numerical_covariance([part.numerical for part in parts])
     for part, own in zip(parts, sections, strict=True):
         covariance[own, own] += part.local @ part.local.T + np.diag(part.white)
     shared = {name: None for part in parts for name in part.shared}
@@ -91,12 +91,12 @@ def _add_errors(parts: Sequence[DropTerms], sections: Sequence[slice]) -> FloatA
     return covariance
 
 
-def _numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
+def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
     """The solver's error of the depth: as large as terms.numerical of the depth reached, alike for alike drops."""
     size = np.concatenate([part.size for part in parts])
     fraction = np.concatenate([part.fraction for part in parts])
     apart = np.zeros((len(parts), len(parts)))  # the same for all points of two drops
-    for name, scale in (("froude", 0.8), ("radius", 2.0), ("mass", 1.5)):
+    for name, scale in (("reach", 0.8), ("radius", 2.0), ("mass", 1.5)):
         value = np.array([getattr(part, name) for part in parts])
         apart += (np.subtract.outer(value, value) / scale) ** 2
     counts = [part.size.size for part in parts]

@@ -163,7 +163,7 @@ def describe_numerics(error: dict[str, float], bench: Workbench) -> str:
         f"under larger ones. So the simulated depth is right to {100 * error['depth_relative']:.2g} % rms, measured against an "
         f"independent solver. The likelihood allows {100 * bench.terms.numerical:.2g} % of the depth for it "
         f"and {100 * bench.terms.numerical_change:.2g} % of what an effect changes of it, alike for like drops; in all drops "
-        f"together {100 * bench.terms.numerical_slope:.2g} % for every factor of 2.7 in speed, "
+        f"together {100 * bench.terms.numerical_slope:.2g} % for every factor of 2.7 in depth over tip radius, "
         f"{100 * bench.terms.numerical_strength:.2g} % of p_m, and a contact that is off by "
         f"{100 * bench.terms.contact_offset:.2g} % of the tip radius."
     )
