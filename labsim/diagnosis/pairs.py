@@ -17,6 +17,7 @@ from .screen import CLOSE, Screening, screen, screen_pairs
 MOST_PAIRS = 3  # partners of one single
 MOST_JOINT = 2  # pairs taken from the linear screening alone
 LEAST_GAIN = 3.0  # ln Bayes factor that a second effect must promise
+SHARE = 0.4  # of two effects the larger gains about half of what both do, or more
 NOTHING = 2.0  # standard deviations within which an effect of a pair is as good as absent
 
 
@@ -25,12 +26,14 @@ def confirm_pairs(
 ) -> list[Fit]:
     """Pairs that the linear screening asks for: partners of the best singles, and those that only work together.
 
-    None is worth its runs that does not come near ``without_place``, ln evidence of a law without a name.
+    None is worth its runs that does not come near ``without_place``, ln evidence of a law without a name, and no single is worth
+    asking for partners that gains less than SHARE of what that law does.
     """
     ranked = sorted(singles, key=lambda fit: -fit.evidence)
     starts: dict[Hypothesis, Fit] = {}
+    worth = nominal.evidence + SHARE * (without_place - nominal.evidence)
     for lead in ranked[:2]:
-        if lead.evidence < max(nominal.evidence, ranked[0].evidence - CLOSE) + LEAST_GAIN:
+        if lead.evidence < max(nominal.evidence + LEAST_GAIN, ranked[0].evidence - CLOSE + LEAST_GAIN, worth):
             continue
         name = lead.hypothesis[0]
         # finer runs of every partner would cost more than they say
