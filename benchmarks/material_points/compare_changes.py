@@ -2,10 +2,11 @@
 
     OMP_NUM_THREADS=1 python benchmarks/material_points/compare_changes.py FOLDER [--cells 5] [--rows ROWS.csv]
 
-FOLDER holds campaigns of make_campaigns.py and their truth.json. Every drop is run by labsim at its true speed and its sample's
-own p_m, with what is hidden and without; ROWS.csv keeps that. On the campaigns with nothing hidden the two codes differ by a
-parabola in ln(depth over tip radius), which is fitted; what others differ by beyond it is the error of what the effect changes.
-Then the ln likelihood of all differences, with the solver's errors that labsim's likelihood has, for several sizes of these.
+FOLDER holds campaigns of make_campaigns.py and their truth.json, or others labelled alike. Every drop is run by labsim at its
+true speed and its sample's own p_m (where told), with what is hidden and without; ROWS.csv keeps that. On the campaigns with
+nothing hidden the two codes differ by a parabola in ln(depth over tip radius), which is fitted; what others differ by beyond it
+is the error of what the effect changes. Then the ln likelihood of all differences, with the solver's errors that labsim's
+likelihood has, for several sizes of these.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from labsim.sph import DropSetting, simulate
 
 DEPTH_BY_STRENGTH = -0.3  # d ln D / d ln p_m
 LEFT = 0.002  # of the depth: lattice, interpolation of the stop
+SCATTER = 0.02  # of ln p_m from sample to sample, where a sample's own is not told
 TRIED = {
     "as they are": {},
     "numerical 0.4 %": {"numerical": 0.004},
@@ -78,7 +80,9 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
     rows = []
     for drop in campaign.drops:
         true = truth["drops"][drop.name]
-        plain = set_nominal_drop(campaign, drop.projectile, true["true_v0"], true["p_m"], cells)
+        plain = set_nominal_drop(
+            campaign, drop.projectile, true["true_v0"], true.get("p_m", truth["pm"]), cells
+        )
         depth = simulate(hide(plain, hidden, effects)).penetration_depth
         change = math.log(depth / simulate(plain).penetration_depth) if hidden else 0.0
         rows.append(
@@ -91,7 +95,8 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
                 "froude": math.log(true["true_v0"] / math.sqrt(drop.projectile.tip_radius / 0.5e-3)),
                 "size": math.log(drop.projectile.tip_radius / 0.5e-3),
                 "mass": math.log(drop.projectile.mass / drop.projectile.tip_radius**3 / 1.064e4),
-                "strength": math.log(true["p_m"] / 1300.0),
+                "strength": math.log(true.get("p_m", truth["pm"]) / 1300.0),
+                "sigma": LEFT if "p_m" in true else math.hypot(LEFT, DEPTH_BY_STRENGTH * SCATTER),
             }
         )
     return rows
@@ -127,7 +132,7 @@ def log_likelihood(rows: pd.DataFrame, terms: Terms, by: str) -> float:
                 np.full(len(drops), DEPTH_BY_STRENGTH * terms.numerical_strength),
             ]
         )
-        covariance = numerical_covariance(parts) + shared @ shared.T + LEFT**2 * np.eye(len(drops))
+        covariance = numerical_covariance(parts) + shared @ shared.T + np.diag(drops.sigma**2)
         lower = np.linalg.cholesky(covariance)
         white = np.linalg.solve(lower, drops.off.to_numpy())
         total -= 0.5 * float(white @ white) + float(np.log(np.diag(lower)).sum())

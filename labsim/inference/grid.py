@@ -135,7 +135,7 @@ class RunGrid:
     scheduler: str | None = None
     progress: Progress | None = None
     extension: Change | None = None  # of the nominal model, by a model.toml
-    runs: dict[tuple[str, int, int | None, int], list[DropRun | FailedRun]] = field(default_factory=dict)
+    runs: dict[tuple[str, float, int | None, int], list[DropRun | FailedRun]] = field(default_factory=dict)
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
