@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +22,7 @@ import pandas as pd
 
 from labsim.campaign import read_campaign
 from labsim.effects import Effect, list_effects
+from labsim.inference.blocks import Block
 from labsim.inference.drop_terms import USUAL_DEPTH, NumericalError, Terms
 from labsim.inference.grid import DEFAULT_CELLS, set_nominal_drop
 from labsim.inference.likelihood import numerical_covariance
@@ -30,7 +30,6 @@ from labsim.sph import DropSetting, simulate
 
 DEPTH_BY_STRENGTH = -0.3  # d ln D / d ln p_m
 LEFT = 0.002  # of the depth: lattice, interpolation of the stop
-SCATTER = 0.02  # of ln p_m from sample to sample, where a sample's own is not told
 TRIED = {
     "as they are": {},
     "numerical 0.4 %": {"numerical": 0.004},
@@ -80,9 +79,8 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
     rows = []
     for drop in campaign.drops:
         true = truth["drops"][drop.name]
-        plain = set_nominal_drop(
-            campaign, drop.projectile, true["true_v0"], true.get("p_m", truth["pm"]), cells
-        )
+        p_m = true.get("p_m", truth["pm"])
+        plain = set_nominal_drop(campaign, drop.projectile, true["true_v0"], p_m, cells)
         depth = simulate(hide(plain, hidden, effects)).penetration_depth
         change = math.log(depth / simulate(plain).penetration_depth) if hidden else 0.0
         rows.append(
@@ -95,8 +93,8 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
                 "froude": math.log(true["true_v0"] / math.sqrt(drop.projectile.tip_radius / 0.5e-3)),
                 "size": math.log(drop.projectile.tip_radius / 0.5e-3),
                 "mass": math.log(drop.projectile.mass / drop.projectile.tip_radius**3 / 1.064e4),
-                "strength": math.log(true.get("p_m", truth["pm"]) / 1300.0),
-                "sigma": LEFT if "p_m" in true else math.hypot(LEFT, DEPTH_BY_STRENGTH * SCATTER),
+                # of samples whose own p_m is not told
+                "sigma": LEFT if "p_m" in true else math.hypot(LEFT, DEPTH_BY_STRENGTH * Terms().scatter),
             }
         )
     return rows
@@ -113,18 +111,14 @@ def fit_nominal(rows: pd.DataFrame, by: str = "reach") -> np.ndarray:
 def log_likelihood(rows: pd.DataFrame, terms: Terms, by: str) -> float:
     """Of the differences of the depths, of all campaigns together; by : what drops are alike by, reach or froude."""
     total = 0.0
-    for _, drops in rows.groupby("campaign"):
+    for _, drops in rows.sort_values("reach", kind="stable").groupby("campaign"):
         changed = 1.0 - np.exp(-drops.change.to_numpy())
         size = np.hypot(terms.numerical, terms.numerical_change * changed)
         parts = [
             NumericalError(np.array([s]), np.ones(1), x, r, m)
             for s, x, r, m in zip(size, drops[by], drops["size"], drops.mass, strict=True)
         ]
-        usual = (
-            USUAL_DEPTH
-            if by == "reach"
-            else float(np.interp(USUAL_DEPTH, *_sorted(drops, "reach", "froude")))
-        )
+        usual = np.interp(USUAL_DEPTH, drops.reach, drops[by])
         shared = np.column_stack(
             [
                 (drops[by] - usual) * terms.numerical_slope,
@@ -133,15 +127,13 @@ def log_likelihood(rows: pd.DataFrame, terms: Terms, by: str) -> float:
             ]
         )
         covariance = numerical_covariance(parts) + shared @ shared.T + np.diag(drops.sigma**2)
-        lower = np.linalg.cholesky(covariance)
-        white = np.linalg.solve(lower, drops.off.to_numpy())
-        total -= 0.5 * float(white @ white) + float(np.log(np.diag(lower)).sum())
+        block = Block(drops.off.to_numpy(), covariance, {})
+        total -= 0.5 * (block.chi_square + block.log_determinant)
     return total
 
 
-def _sorted(rows: pd.DataFrame, *names: str) -> tuple[np.ndarray, ...]:
-    ordered = rows.sort_values(names[0])
-    return tuple(ordered[name].to_numpy() for name in names)
+def find_rms(values: pd.Series) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def tabulate(rows: pd.DataFrame) -> pd.DataFrame:
@@ -153,25 +145,20 @@ def tabulate(rows: pd.DataFrame) -> pd.DataFrame:
         least=("change", "min"),
         most=("change", "max"),
         mean=("left", "mean"),
-        rms=("left", lambda left: float(np.sqrt(np.mean(left**2)))),
+        rms=("left", find_rms),
     )
-    change = grouped.change.agg(lambda change: float(np.sqrt(np.mean(change**2))))
+    change = grouped.change.agg(find_rms)
     result["share"] = (result.rms / change.where(change > 0.0)).round(3)
     return result
 
 
-def compare_sizes(rows: pd.DataFrame, tried: Mapping[str, Mapping[str, float]]) -> str:
+def compare_sizes(rows: pd.DataFrame) -> str:
     """ln likelihood less that of the sizes as they are."""
     without_gas = rows[~rows.hidden.str.contains("pore_gas")]
-    least = log_likelihood(without_gas, Terms(), "reach")
-    lines = [
-        f"{'alike by speed over root of radius':36s}{log_likelihood(without_gas, Terms(), 'froude') - least:+9.1f}"
-    ]
-    for name, sizes in tried.items():
-        lines.append(
-            f"{name:36s}{log_likelihood(without_gas, replace(Terms(), **sizes), 'reach') - least:+9.1f}"
-        )
-    return "\n".join(lines)
+    found = {"alike by speed over root of radius": log_likelihood(without_gas, Terms(), "froude")}
+    for name, sizes in TRIED.items():
+        found[name] = log_likelihood(without_gas, replace(Terms(), **sizes), "reach")
+    return "\n".join(f"{name:36s}{each - found['as they are']:+9.1f}" for name, each in found.items())
 
 
 def main() -> None:
@@ -194,11 +181,9 @@ def main() -> None:
     print(tabulate(rows).round(2).to_string())
     plain = rows[rows.hidden == "nothing"]
     for by in ("reach", "froude"):
-        left = plain.off - fit_nominal(plain, by)
-        print(
-            f"nothing hidden, left by a parabola in {by}: {100 * float(np.sqrt(np.mean(left**2))):.2f} % rms"
-        )
-    print(compare_sizes(rows, TRIED))
+        left = 100 * find_rms(plain.off - fit_nominal(plain, by))
+        print(f"nothing hidden, left by a parabola in {by}: {left:.2f} % rms")
+    print(compare_sizes(rows))
 
 
 if __name__ == "__main__":

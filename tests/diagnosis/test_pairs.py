@@ -52,7 +52,9 @@ def test_a_law_without_a_name_far_ahead_leaves_none_worth_its_runs(monkeypatch, 
 
 def test_partners_of_a_single_that_explains_little_are_not_even_asked_for(monkeypatch):
     """To screen them takes runs about the single: it gains 50, a law without a name 124 or 126."""
-    assert confirm(monkeypatch, without_place=224.0, partner=50.0, joint=0.0) == [("shear_strength", "pore_gas")]
+    assert confirm(monkeypatch, without_place=224.0, partner=50.0, joint=0.0) == [
+        ("shear_strength", "pore_gas")
+    ]
     assert confirm(monkeypatch, without_place=226.0, partner=50.0, joint=0.0) == []
 
 

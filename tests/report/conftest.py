@@ -55,7 +55,8 @@ def none(place: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def unknown(place: Path) -> Path:
-    """Every other drop 8 % deeper than the law, the others 8 % shallower, which no law is; with a scan, which enters the likelihood, and a second one that is left out."""
+    """Every other drop 8 % deeper than the law, the others 8 % shallower; with a scan, which enters the likelihood, and a second
+    one that is left out."""
     folder = laws.write_campaign(place / "campaign-unknown", odd=0.08, scan=True)
     campaign = read_campaign(folder)
     found = diagnose_campaign(campaign, laws.LawStore(place / "store"), workers=1, use_scans=True)
