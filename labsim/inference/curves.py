@@ -12,13 +12,14 @@ from scipy.interpolate import CubicSpline, PPoly
 
 from ..records import FloatArray
 from ..sph import DropRun
+from .run_parts import Motion
 
 FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)
 UNIT_SPLINES = np.ascontiguousarray(CubicSpline(FRACTIONS, np.eye(FRACTIONS.size)).c)
 
 
-def encode_run(run: DropRun) -> FloatArray:
+def encode_run(run: DropRun | Motion) -> FloatArray:
     """(2 + len(FRACTIONS),): ln D, ln T_s and the normalised depths of one run."""
     shape = run.depth_at(FRACTIONS * run.stopping_time) / run.penetration_depth
     return np.concatenate([[np.log(run.penetration_depth), np.log(run.stopping_time)], shape])

@@ -73,6 +73,7 @@ def fit_hypothesis(
     coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
     least : ln likelihood, priors included, of a start below which no step is taken.
+    iterations : most steps of the globals; with none they stay, and the nuisances alone are moved to their best.
     """
     # tables are those of the workbench, nuisances the fit's own
     models = [

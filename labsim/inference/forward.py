@@ -34,6 +34,9 @@ class ResponseTable:
     base: dict[float, FloatArray] = field(default_factory=dict)
     changes: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
+    _stacks: dict[int, tuple[Mapping[float, FloatArray], FloatArray]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def code(self, log_p_m: float, log_speed: float, amplitudes: Mapping[str, float]) -> FloatArray:
         """Interpolated code (m,)."""
@@ -47,10 +50,16 @@ class ResponseTable:
             )
         across = interpolation_weights(self.log_speeds, log_speed)
         weights = smooth_weights(_log_strengths(self.base), log_p_m)
-        plain = sum(
-            weight * (across @ codes) for codes, weight in zip(self.base.values(), weights, strict=True)
-        )
-        return Response(self, log_p_m, log_speed, across, np.asarray(plain))
+        plain = np.outer(weights, across).ravel() @ self.stack(self.base)
+        return Response(self, log_p_m, log_speed, across, plain)
+
+    def stack(self, codes: Mapping[float, FloatArray]) -> FloatArray:
+        """The codes of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""
+        known, stacked = self._stacks.get(id(codes), (None, None))
+        if stacked is None or known is not codes or len(stacked) != sum(map(len, codes.values())):
+            stacked = np.concatenate(list(codes.values()))
+            self._stacks[id(codes)] = codes, stacked
+        return stacked
 
 
 @dataclass(frozen=True)
@@ -81,19 +90,17 @@ class Response:
         indices = [index for index in runs if runs[index]]
         nodes = _log_strengths(indices)
         margin = 0.5 * math.log(STRENGTH_RATIO)
-        inside = min(max(self.log_p_m, nodes.min() - margin), nodes.max() + margin)
-        change = 0.0
+        inside = min(max(self.log_p_m, min(nodes) - margin), max(nodes) + margin)
+        change = np.zeros(self.plain.size)
         for index, weight in zip(indices, smooth_weights(nodes, inside), strict=True):
-            known = list(runs[index])
-            shares = smooth_weights([0.0, *known], amplitude)[1:]
-            part = sum(share * (across @ runs[index][a]) for a, share in zip(known, shares, strict=True))
-            change = weight * part + change
-        return np.asarray(change)
+            shares = smooth_weights((0.0, *runs[index]), amplitude)[1:]
+            change += weight * (np.outer(shares, across).ravel() @ self.table.stack(runs[index]))
+        return change
 
 
-def _log_strengths(indices: Iterable[float]) -> FloatArray:
+def _log_strengths(indices: Iterable[float]) -> list[float]:
     """ln of p_m at strength nodes."""
-    return np.array([math.log(strength_node(index)) for index in indices])
+    return [math.log(strength_node(index)) for index in indices]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..records import Campaign, FloatArray, Projectile
-from ..sph import DropRun, DropSetting
+from ..sph import DropSetting
 from .run_file import FailedRun
+from .run_parts import AnyPart, Compaction, Motion, Part
 from .runs import Progress, RunStore
 
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
@@ -81,23 +82,37 @@ def strength_node(index: float) -> float:
     return STRENGTH_ANCHOR * STRENGTH_RATIO**index
 
 
-def interpolation_weights(nodes: FloatArray, at: float) -> FloatArray:
-    """Lagrange weights (k,) of the polynomial through all nodes."""
-    own = np.eye(len(nodes), dtype=bool)
-    apart = np.where(own, 1.0, np.subtract.outer(nodes, nodes))
-    return np.asarray(np.where(own, 1.0, (at - nodes) / apart).prod(axis=1))
+def interpolation_weights(nodes: Sequence[float] | FloatArray, at: float) -> FloatArray:
+    """Lagrange weights (k,), not to be written to, of the polynomial through all nodes."""
+    return _lagrange_weights(tuple(nodes), at)
 
 
-def smooth_weights(nodes: Sequence[float], at: float) -> FloatArray:
-    """Weights (k,) of a curve through all nodes, smooth however many there are: the polynomial up to four, then a cubic spline.
+def smooth_weights(nodes: Sequence[float] | FloatArray, at: float) -> FloatArray:
+    """Weights (k,), not to be written to, of a curve through all nodes, smooth however many there are: the polynomial up to
+    four, then a cubic spline.
 
     The polynomial through the nearest few jumps where their choice changes, and a slope taken across a jump leads astray.
     """
-    if len(nodes) <= 4:
-        return interpolation_weights(np.asarray(nodes), at)
+    nodes = tuple(nodes)
+    return _lagrange_weights(nodes, at) if len(nodes) <= 4 else _spline_weights(nodes, at)
+
+
+# every drop asks for the same weights for each of its errors and tangents
+@lru_cache(maxsize=4096)
+def _lagrange_weights(nodes: tuple[float, ...], at: float) -> FloatArray:
+    own = np.eye(len(nodes), dtype=bool)
+    apart = np.where(own, 1.0, np.subtract.outer(nodes, nodes))
+    weights = np.where(own, 1.0, (at - np.array(nodes)) / apart).prod(axis=1)
+    weights.flags.writeable = False
+    return np.asarray(weights)
+
+
+@lru_cache(maxsize=4096)
+def _spline_weights(nodes: tuple[float, ...], at: float) -> FloatArray:
     order = np.argsort(nodes)
     weights = np.empty(len(nodes))
-    weights[order] = _unit_spline(tuple(np.asarray(nodes)[order]))(at)
+    weights[order] = _unit_spline(tuple(np.array(nodes)[order]))(at)
+    weights.flags.writeable = False
     return weights
 
 
@@ -135,7 +150,7 @@ class RunGrid:
     scheduler: str | None = None
     progress: Progress | None = None
     extension: Change | None = None  # of the nominal model, by a model.toml
-    runs: dict[tuple[str, float, int | None, int], list[DropRun | FailedRun]] = field(default_factory=dict)
+    runs: dict[tuple[str, float, int | None, int], list[AnyPart | FailedRun]] = field(default_factory=dict)
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
@@ -152,6 +167,7 @@ class RunGrid:
             if (request.variant, request.index, request.cells, number) not in self.runs
         ]
         settings, places = [], []
+        parts: list[Part] = []
         for request, number in missing:
             family = self.families[number]
             positions = range(len(family.speeds)) if request.cells is None else family.few
@@ -160,11 +176,17 @@ class RunGrid:
                     family, family.speeds[position], strength_node(request.index), request.cells
                 )
                 settings.append(request.change(setting) if request.change is not None else setting)
+                parts.append(Compaction if family.is_scan else Motion)
             places.append((request, number, len(positions)))
         if not settings:
             return
         runs = self.store.get_many(
-            settings, workers=self.workers, scheduler=self.scheduler, progress=self.progress, text=text
+            settings,
+            workers=self.workers,
+            scheduler=self.scheduler,
+            progress=self.progress,
+            text=text,
+            parts=parts,
         )
         at = 0
         for request, number, count in places:
@@ -173,8 +195,8 @@ class RunGrid:
 
     def stopped_runs(
         self, variant: str, index: float, cells: int | None, number: int
-    ) -> list[DropRun] | None:
+    ) -> list[AnyPart] | None:
         """Runs of one family, in the order of its speeds, or None where one failed or never stopped."""
         runs = self.runs[variant, index, cells, number]
-        good = [run for run in runs if isinstance(run, DropRun) and run.stopped]
+        good = [run for run in runs if not isinstance(run, FailedRun) and run.stopped]
         return good if len(good) == len(runs) else None

@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import InferenceError, LabsimError
 from ..sph import DropRun, DropSetting, solver_hash
+from .run_parts import AnyPart, Part
 
 FORMAT = 1  # of the stored files; part of the key
 HEAD = 512  # bytes before the HDF5 part, the smallest user block there is
@@ -155,7 +156,10 @@ def read_run_file(path: Path | str) -> DropRun | FailedRun:
     return run
 
 
-def read_run(path: Path, setting: DropSetting, key: str | None = None) -> DropRun | FailedRun | None:
+def read_run(
+    path: Path, setting: DropSetting, key: str | None = None, part: Part = DropRun
+) -> AnyPart | FailedRun | None:
+    """What a file holds of a run, or None where there is none; raises one of DAMAGE."""
     if not path.is_file():
         return None
     with _open(path) as stored:
@@ -163,7 +167,7 @@ def read_run(path: Path, setting: DropSetting, key: str | None = None) -> DropRu
             raise ValueError("is another run under this name")
         if stored.attrs["status"] == "failed":
             return FailedRun(setting, str(stored.attrs["message"]))
-        return _unpack(stored["run"], DropRun, given={"setting": setting})
+        return _unpack(stored["run"], part, given={"setting": setting})
 
 
 def read_label(path: Path) -> Stored:

@@ -33,6 +33,7 @@ from .run_file import (
     say_setting,
     write_run_file,
 )
+from .run_parts import AnyPart, Part
 from .workers import is_loss, open_executor
 
 Progress = Callable[[float, float, str], None]  # work done, all work (in any unit), what is done
@@ -68,9 +69,9 @@ class RunStore:
         """The stored run of this setting and this solver, or None (also where its file is damaged)."""
         return self._read(make_key(setting), setting)
 
-    def _read(self, key: str, setting: DropSetting) -> DropRun | FailedRun | None:
+    def _read(self, key: str, setting: DropSetting, part: Part = DropRun) -> AnyPart | FailedRun | None:
         try:
-            return read_run(self.path(key), setting, key)
+            return read_run(self.path(key), setting, key, part)
         except DAMAGE:
             return None
 
@@ -108,18 +109,24 @@ class RunStore:
         scheduler: str | None = None,
         progress: Progress | None = None,
         text: str = "simulating",
-    ) -> list[DropRun | FailedRun]:
+        parts: Sequence[Part] | None = None,
+    ) -> list[AnyPart | FailedRun]:
         """Runs of all settings, in their order; equal settings are run once, the longest first.
 
         progress is told the cost that is done and the cost of what was missing, so that the time left can be told.
+        parts : per setting, what is read of a run that is stored; the whole where nothing is said.
         Raises InferenceError when a worker process dies; what was finished by then is stored.
         """
         report = progress or (lambda done, total, text: None)
         keys = [make_key(setting) for setting in settings]
         by_key = dict(zip(keys, settings, strict=True))
-        results: dict[str, DropRun | FailedRun] = {}
+        part_by_key: dict[str, Part] = {}
+        for key, part in zip(keys, parts or [DropRun] * len(keys), strict=True):
+            # asked for twice, as different parts: whole
+            part_by_key[key] = part if part_by_key.get(key, part) is part else DropRun
+        results: dict[str, AnyPart | FailedRun] = {}
         for key, setting in by_key.items():
-            if (stored := self._read(key, setting)) is not None:
+            if (stored := self._read(key, setting, part_by_key[key])) is not None:
                 results[key] = stored
         self.reused += len(results)
         missing = sorted(set(by_key) - set(results), key=lambda key: -estimate_cost(by_key[key]))

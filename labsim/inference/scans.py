@@ -24,6 +24,7 @@ from ..sph import DropRun
 from .blocks import Block
 from .drop_terms import Probe, Terms
 from .forward import ResponseTable
+from .run_parts import Compaction
 from .undisturbed import GREY, observe_undisturbed
 
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
@@ -103,7 +104,7 @@ def observe_scan(reduced: ReducedScan) -> ObservedScan:
 
 
 def see_dust(
-    run: DropRun,
+    run: DropRun | Compaction,
     frame: FillingMap,
     blur: float,
     *,
@@ -126,7 +127,7 @@ def see_dust(
     )
 
 
-def encode_scan_run(run: DropRun, observed: ObservedScan) -> FloatArray:
+def encode_scan_run(run: DropRun | Compaction, observed: ObservedScan) -> FloatArray:
     """(1 + n,): ln D and the filling factor on the compared cells, through the point spread that the scan itself shows."""
     reduced = observed.reduced
     seen = see_dust(run, reduced.map, reduced.point_spread, masked=~observed.cells)

@@ -101,6 +101,13 @@ def test_effects_add_a_polynomial_that_vanishes_at_null():
     assert table.code(math.log(1200.0), speeds[1], {"e": 0.0}) == pytest.approx(plain, abs=0)
     # 0.1 a² goes through (0, 0), (1, 0.1), (2, 0.4)
     assert table.code(math.log(1200.0), speeds[1], {"e": 1.5}) - plain == pytest.approx(0.225, rel=1e-12)
+    # runs that are added later, and those of another effect that takes the name, count at once
+    table.base[2] = base - 0.5
+    later = table.code(math.log(4000.0), speeds[1], {})
+    assert later == pytest.approx(base[1] - 0.5, rel=1e-12)
+    table.changes["f"] = {0: {1.0: 0.3 * np.ones_like(base), 2.0: 1.2 * np.ones_like(base)}}
+    table.changes["e"] = table.changes.pop("f")
+    assert table.at(math.log(1200.0), speeds[1]).change("e", 1.5) == pytest.approx(0.675, rel=1e-12)
 
 
 def test_what_an_effect_changes_bends_with_strength_through_three_nodes():

@@ -15,7 +15,9 @@ import pytest
 from labsim.errors import InferenceError, SimulationError
 from labsim.inference import run_file
 from labsim.inference.convergence import extrapolate, refine
+from labsim.inference.curves import encode_run
 from labsim.inference.run_file import FailedRun, canonical, make_key, read_run_file, write_run_file
+from labsim.inference.run_parts import Compaction, Motion
 from labsim.inference.runs import RunStore, require_runs
 from labsim.records import Material, Projectile
 from labsim.sph import DropRun, DropSetting, Numerics
@@ -90,6 +92,22 @@ def test_many_workers_give_the_numbers_of_one(tmp_path: Path) -> None:
     assert two.new == 3 and len(seen) == 4 and seen[0][0] == 0.0 and seen[-1][0] == seen[-1][1]
     for a, b, setting in zip(require_runs(many), require_runs(one), settings, strict=True):
         assert same(a, b) and a.setting == setting
+
+
+def test_parts_of_a_stored_run_are_those_of_the_whole(tmp_path: Path) -> None:
+    store, settings = RunStore(tmp_path), [small_drop(0.2), small_drop(0.3)]
+    first, second = require_runs(store.get_many(settings, workers=1))
+    motion, dust = store.get_many(settings, workers=1, parts=[Motion, Compaction])
+    times = np.linspace(-1e-4, 1.2 * first.stopping_time, 50)
+    assert isinstance(motion, Motion) and np.array_equal(motion.depth_at(times), first.depth_at(times))
+    assert np.array_equal(encode_run(motion), encode_run(first))
+    assert isinstance(dust, Compaction) and dust.penetration_depth == second.penetration_depth
+    for name in ("r", "z", "volume", "filling_factor"):
+        assert np.array_equal(getattr(dust.particles, name), getattr(second.particles, name))
+    both = store.get_many([small_drop(), small_drop()], workers=1, parts=[Motion, Compaction])
+    assert all(isinstance(run, DropRun) for run in both)  # asked for as two parts, and new
+    both = store.get_many([small_drop(), small_drop()], workers=1, parts=[Motion, Compaction])
+    assert all(isinstance(run, DropRun) and same(run, second) for run in both)
 
 
 def test_a_run_that_blows_up_is_kept_as_failed_and_named(tmp_path: Path) -> None:
