@@ -4,6 +4,10 @@
 
 FOLDER holds campaigns and ``truth.json`` (cause, p_m, note per campaign). Prints top-1, class, false alarms, wrong
 names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaign's folder only; truth is opened afterwards.
+
+gain is what the extension removes of what held-out drops show above the noise that is expected. What can be removed is what the
+hidden cause itself removes, at its true strength and p_m: "by truth" is its gain, "share" the part of the lowering of the mean
+square that the extension reaches.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
 import subprocess
 import time
 from collections.abc import Iterable
@@ -19,11 +24,25 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from material_points.compare_changes import HIDDEN
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
+from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.diagnosis.screen import CONFUSABLE
+from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.runs import RunStore
+
+# words of truth.json -> the effect whose first parameter they give
+WORDS = HIDDEN | {
+    "pixel": "pixel_scale",
+    "frame": "frame_rate",
+    "mass": "projectile_mass",
+    "surface_row": "surface_row",
+    "scale": "ct_scale",
+}
+PROFILES = {"crust": ("surface_crust", "df"), "gradient": ("density_gradient", "slope")}
+LEAST_REMOVED = 0.1  # of the mean square, by the truth: where it removes less there is nothing to share
 
 
 def name_hypothesis(causes: Iterable[str]) -> str:
@@ -51,6 +70,39 @@ def describe(name: str, found: Diagnosis) -> dict:
         "runs_new": found.runs_new,
         "wall": found.wall,
     }
+
+
+def read_hidden(truth: dict) -> dict[str, float]:
+    """Effects that are hidden with the values of their first parameters; empty where one has no name or form here."""
+    terms = truth["mat"] | truth["dyn"] | truth["measure"] | truth["ct"]
+    if terms.pop("raten", 0.5) != 0.5:
+        return {}
+    values = {}
+    if "side" in terms:  # told in words, per length of a 1 mm rod
+        del terms["side"]
+        values["side_friction"] = float(re.search(r"([\d.]+) N/m", truth["note"])[1])
+    if truth["drift"]:
+        values["sample_drift"] = truth["drift"]
+    if truth["profile"]:
+        name, key = PROFILES.get(truth["profile"]["kind"], ("", ""))
+        values[name] = truth["profile"].get(key, 0.0)
+    values |= {WORDS.get(word, ""): value for word, value in terms.items()}
+    return {} if "" in values or truth.get("small_strength") else values
+
+
+def compare_gain(found: Diagnosis, truth: dict) -> dict:
+    """The gain of what is hidden, at its true strength and p_m, and the share of what that removes which the extension does."""
+    bench, hidden = found.bench, read_hidden(truth)
+    if not hidden or any(name not in bench.effects for name in hidden):
+        return {"by_truth": math.nan, "share": math.nan}
+    amplitudes = {name: value - bench.effects[name].amplitudes[0].null for name, value in hidden.items()}
+    start = (math.log(truth["pm"]), amplitudes)
+    fit = fit_hypothesis(bench, tuple(hidden), start, nuisances=found.best, iterations=0)
+    true = measure_gain(found.held_out_nominal, predict_held_out(bench, fit, known=True))
+    before = found.gain.rms_nominal**2
+    removed, removable = before - found.gain.rms_extended**2, before - true.rms_extended**2
+    share = removed / removable if removable > LEAST_REMOVED * before else math.nan
+    return {"by_truth": true.fraction_removed, "share": share}
 
 
 def score(rows: list[dict], truth: dict) -> pd.DataFrame:
@@ -85,6 +137,8 @@ def score(rows: list[dict], truth: dict) -> pd.DataFrame:
                 "p_m nominal": round(row["p_m_nominal"]),
                 "in 90 %": low <= known["pm"] <= high,
                 "gain": round(row["gain"], 2),
+                "by truth": round(row["by_truth"], 2),
+                "share": round(row["share"], 2),
                 "new runs": row["runs_new"],
                 "s": round(row["wall"]),
             }
@@ -105,6 +159,7 @@ def main() -> None:
     only = {name for name in options.only.split(",") if name}
     names = sorted(path.parent.name for path in options.folder.glob("*/campaign.toml"))
     rows = []
+    truths = options.folder / "truth.json"
     for name in names:
         if only and name not in only:
             continue
@@ -115,7 +170,8 @@ def main() -> None:
         rows.append(describe(name, found))
         top = ", ".join(f"{h} {p:.3f}" for h, p in rows[-1]["ranked"][:3])
         print(f"{name}: {top}  ({time.perf_counter() - began:.0f} s)", flush=True)
-    table = score(rows, json.loads((options.folder / "truth.json").read_text()))
+        rows[-1] |= compare_gain(found, json.loads(truths.read_text())[name])
+    table = score(rows, json.loads(truths.read_text()))
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
     ).stdout.strip()
@@ -127,7 +183,9 @@ def main() -> None:
         f"{int(others.named.sum())} of {len(others)}; wrong cause with "
         f"P > 0.5 {int(table['wrong>0.5'].sum())} of {len(table)}; mean Brier {table.Brier.mean():.3f}; p_m in its 90 % "
         f"interval {int(table['in 90 %'].sum())} of {len(table)}; median gain "
-        f"{others.gain.median() if len(others) else math.nan:.2f}",
+        f"{others.gain.median() if len(others) else math.nan:.2f}, share of what the truth removes "
+        f"{others.share.median():.2f} ({others.share.min():.2f} to {others.share.max():.2f}; {others.share.count()} with "
+        "something to remove)",
     ]
     text = "\n".join(lines)
     print(table.to_string(index=False))

@@ -7,6 +7,7 @@ drops. Everything is the linear Gaussian algebra of the likelihood about the fit
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,25 +39,25 @@ class Gain:
     fraction_removed: float
 
 
-def predict_held_out(bench: Workbench, fit: Fit) -> HeldOut:
+def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> HeldOut:
     """Leave each drop out, fit the globals to the others, predict its motion below the surface.
 
-    A single drop leaves nothing to predict it from: its figures are NaN.
+    A single drop leaves nothing to predict it from: its figures are NaN. known : the globals are held where the fit has them.
     """
     linear = fit.linear
     if len(fit.models) < 2:
         nothing = np.full(1, math.nan)
         return HeldOut((fit.models[0].observed.name,), nothing, nothing, nothing, np.ones(1))
-    names = ["ln_p_m", *fit.hypothesis]
-    design = np.stack([linear.tangents[name] for name in names], axis=1)
+    names = [] if known else ["ln_p_m", *fit.hypothesis]
+    design = _stack(linear.tangents, names, linear.residual.size)
     precision = np.zeros((len(names), len(names)))
     pull = np.zeros(len(names))
-    for k, name in enumerate(fit.hypothesis, start=1):
+    for k, name in enumerate(names[1:], start=1):
         width = bench.effects[name].amplitudes[0].scale
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
     for block in linear.further:  # scans are never held out
-        columns = np.stack([block.tangents[name] for name in names], axis=1)
+        columns = _stack(block.tangents, names, block.residual.size)
         solved = block.solve(columns)
         precision += columns.T @ solved
         pull += solved.T @ block.residual
@@ -94,6 +95,11 @@ def predict_held_out(bench: Workbench, fit: Fit) -> HeldOut:
         count.append(error.size)
     order = tuple(model.observed.name for model in fit.models)
     return HeldOut(order, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
+
+
+def _stack(tangents: Mapping[str, FloatArray], names: Sequence[str], rows: int) -> FloatArray:
+    """(rows, names) of tangents; there may be none."""
+    return np.array([tangents[name] for name in names]).reshape(len(names), rows).T
 
 
 def measure_gain(nominal: HeldOut, extended: HeldOut) -> Gain:

@@ -1,0 +1,94 @@
+"""Held-out drops against the conditional normal distribution worked out another way, and the gain against its formula."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from labsim.diagnosis.gain import HeldOut, measure_gain, predict_held_out
+from labsim.inference.likelihood import Linearised
+
+POINTS, DROPS, WIDE, SCALE = 6, 5, 100.0, 0.3
+NAMES = [f"D{k:02d}" for k in range(1, DROPS + 1)]
+EFFECT = "shear_strength"
+
+
+def make_fit(seed: int, *, hidden: float = 0.0):
+    """Drops of linear response with errors of their own and shared ones, about a fit that is off by some p_m and ``hidden``."""
+    random = np.random.default_rng(seed)
+    n = POINTS * DROPS
+    depth = np.tile(np.linspace(-1e-3, 1e-3, POINTS), DROPS)  # half of the points are above the surface
+    tangents = {name: random.normal(0, 1e-5, n) for name in ("ln_p_m", EFFECT)}
+    shared = random.normal(0, 3e-6, (n, 3))
+    covariance = shared @ shared.T + np.diag(random.uniform(1e-6, 4e-6, n) ** 2)
+    residual = (
+        random.multivariate_normal(np.zeros(n), covariance)
+        + tangents["ln_p_m"] * random.normal()
+        + tangents[EFFECT] * hidden
+    )
+    sections = {name: slice(k * POINTS, (k + 1) * POINTS) for k, name in enumerate(NAMES)}
+    linear = Linearised(residual, covariance, tangents, sections, [], [])
+    models = [
+        SimpleNamespace(
+            matrix=np.eye(POINTS),
+            observed=SimpleNamespace(name=name, depth=depth[sections[name]], sigma=1e-6),
+        )
+        for name in NAMES
+    ]
+    fit = SimpleNamespace(linear=linear, models=models, hypothesis=(EFFECT,), values={EFFECT: 0.0})
+    bench = SimpleNamespace(effects={EFFECT: SimpleNamespace(amplitudes=[SimpleNamespace(scale=SCALE)])})
+    return bench, fit
+
+
+def condition(linear: Linearised, held: np.ndarray, widths: dict[str, float]):
+    """Mean and covariance of held-out points given all others: globals are one more normal error each."""
+    joint = linear.covariance + sum(
+        width**2 * np.outer(linear.tangents[name], linear.tangents[name]) for name, width in widths.items()
+    )
+    weights = joint[np.ix_(held, ~held)] @ np.linalg.inv(joint[np.ix_(~held, ~held)])
+    return weights @ linear.residual[~held], joint[np.ix_(held, held)] - weights @ joint[np.ix_(~held, held)]
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_held_out_drop_is_predicted_as_a_normal_distribution_says(known):
+    bench, fit = make_fit(3)
+    found = predict_held_out(bench, fit, known=known)
+    widths = {} if known else {"ln_p_m": WIDE, EFFECT: SCALE}
+    for k in range(DROPS):
+        held = np.zeros(POINTS * DROPS, dtype=bool)
+        held[k * POINTS + POINTS // 2 : (k + 1) * POINTS] = True  # below the surface
+        mean, spread = condition(fit.linear, held, widths)
+        data = fit.linear.residual[held]
+        assert found.count[k] == POINTS // 2
+        assert found.rms[k] == pytest.approx(math.sqrt(np.mean((data - mean) ** 2)), rel=1e-4)
+        assert found.expected[k] == pytest.approx(math.sqrt(np.mean(np.diag(spread))), rel=1e-4)
+        # in units in which a covariance is not taken for singular
+        score = multivariate_normal.logpdf(data * 1e6, mean * 1e6, spread * 1e12) + data.size * math.log(1e6)
+        assert found.log_score[k] == pytest.approx(score, abs=1e-2)
+
+
+def test_drops_miss_by_what_is_expected_of_a_true_model_and_by_more_of_a_wrong_one():
+    right, wrong = [], []
+    for seed in range(60):
+        for hidden, ratios in ((0.0, right), (4.0, wrong)):
+            bench, fit = make_fit(seed, hidden=hidden)
+            fit.hypothesis = ()
+            found = predict_held_out(bench, fit)
+            ratios.append(np.mean(found.rms**2) / np.mean(found.expected**2))
+    assert np.mean(right) == pytest.approx(1.0, abs=3 * np.std(right) / math.sqrt(len(right)))
+    assert np.std(right) / math.sqrt(len(right)) < 0.1
+    assert np.mean(wrong) > 3.0
+
+
+def test_the_gain_is_the_share_of_the_mean_square_above_the_noise():
+    def held_out(rms: float, score: float) -> HeldOut:
+        return HeldOut(
+            ("D01", "D02"), np.full(2, rms), np.full(2, 4e-6), np.array([score, score + 2]), np.ones(2)
+        )
+
+    gain = measure_gain(held_out(10e-6, 100.0), held_out(5e-6, 110.0))
+    assert gain.fraction_removed == pytest.approx(1 - (25 - 16) / (100 - 16))
+    assert (gain.log_score_difference, gain.log_score_difference_sigma) == (20.0, 0.0)
+    assert measure_gain(held_out(3e-6, 0.0), held_out(3e-6, 0.0)).fraction_removed == 0.0  # nothing to remove
