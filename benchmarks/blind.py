@@ -30,6 +30,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.diagnosis.screen import CONFUSABLE
+from labsim.diagnosis.shapes import MARK, with_shape
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.runs import RunStore
 
@@ -41,7 +42,7 @@ WORDS = HIDDEN | {
     "surface_row": "surface_row",
     "scale": "ct_scale",
 }
-PROFILES = {"crust": ("surface_crust", "df"), "gradient": ("density_gradient", "slope")}
+PROFILES = {"crust": ("surface_crust", "df", "l"), "gradient": ("density_gradient", "slope", "")}
 LEAST_REMOVED = 0.1  # of the mean square, by the truth: where it removes less there is nothing to share
 
 
@@ -72,21 +73,21 @@ def describe(name: str, found: Diagnosis) -> dict:
     }
 
 
-def read_hidden(truth: dict) -> dict[str, float]:
-    """Effects that are hidden with the values of their first parameters; empty where one has no name or form here."""
+def read_hidden(truth: dict) -> dict[str, tuple[float, float | None]]:
+    """Effects that are hidden with the values of their first parameter and of their shape; empty where one has no name here."""
     terms = truth["mat"] | truth["dyn"] | truth["measure"] | truth["ct"]
-    if terms.pop("raten", 0.5) != 0.5:
-        return {}
-    values = {}
+    exponent = terms.pop("raten", None)
+    values: dict[str, tuple[float, float | None]] = {}
     if "side" in terms:  # told in words, per length of a 1 mm rod
         del terms["side"]
-        values["side_friction"] = float(re.search(r"([\d.]+) N/m", truth["note"])[1])
+        values["side_friction"] = float(re.search(r"([\d.]+) N/m", truth["note"])[1]), None
     if truth["drift"]:
-        values["sample_drift"] = truth["drift"]
+        values["sample_drift"] = truth["drift"], None
     if truth["profile"]:
-        name, key = PROFILES.get(truth["profile"]["kind"], ("", ""))
-        values[name] = truth["profile"].get(key, 0.0)
-    values |= {WORDS.get(word, ""): value for word, value in terms.items()}
+        name, size, length = PROFILES.get(truth["profile"]["kind"], ("", "", ""))
+        values[name] = truth["profile"].get(size, 0.0), truth["profile"].get(length)
+    for word, value in terms.items():
+        values[WORDS.get(word, "")] = value, exponent if word == "eta" else None
     return {} if "" in values or truth.get("small_strength") else values
 
 
@@ -95,9 +96,15 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
     bench, hidden = found.bench, read_hidden(truth)
     if not hidden or any(name not in bench.effects for name in hidden):
         return {"by_truth": math.nan, "share": math.nan}
-    amplitudes = {name: value - bench.effects[name].amplitudes[0].null for name, value in hidden.items()}
+    amplitudes = {}
+    for name, (value, shape) in hidden.items():
+        effect, label = bench.effects[name], name
+        if shape is not None:
+            label = f"{name}{MARK}{shape:g} as hidden"
+            bench.effects[label] = with_shape(effect, shape)
+        amplitudes[label] = value - effect.amplitudes[0].null
     start = (math.log(truth["pm"]), amplitudes)
-    fit = fit_hypothesis(bench, tuple(hidden), start, nuisances=found.best, iterations=0)
+    fit = fit_hypothesis(bench, tuple(amplitudes), start, nuisances=found.best, iterations=0)
     true = measure_gain(found.held_out_nominal, predict_held_out(bench, fit, known=True))
     before = found.gain.rms_nominal**2
     removed, removable = before - found.gain.rms_extended**2, before - true.rms_extended**2
