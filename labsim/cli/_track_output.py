@@ -70,7 +70,7 @@ def summarise(
 ) -> dict[str, Any]:
     """What drop.json holds."""
     summary: dict[str, Any] = {}
-    figures = {
+    figures: dict[str, Any] = {
         "contact_time_s": curve and curve.contact_time,
         "impact_speed_m_s": curve and curve.impact_speed,
         "penetration_depth_m": curve and curve.penetration_depth,

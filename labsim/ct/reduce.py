@@ -11,7 +11,8 @@ from ..errors import MeasurementError
 from ..records import FillingMap, FloatArray, Measured, Scan
 from .artefacts import Cupping, fit_cupping, remove_rings
 from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
-from .bead import WIDE, Bead, find_bead, find_widest
+from .bead import Bead, find_bead
+from .bead_edge import WIDE, find_widest
 from .grey import GreyCheck, check_grey, check_levels, to_filling_factor, warn_of_grey
 from .stack import SliceStack, open_stack
 from .surface import Surface, find_surface

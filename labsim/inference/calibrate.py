@@ -19,12 +19,13 @@ from .drop_terms import Terms
 from .error_sizes import integrate_sizes
 from .fitting import Fit, fit_hypothesis, goodness_of_fit
 from .measure import Measurements, measure
+from .open_workbench import open_workbench
 from .posterior import Posterior, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
 from .settle import list_large, settle
 from .target import make_target
-from .workbench import Workbench, open_workbench
+from .workbench import Workbench
 
 LOST = 1e-6  # p value of a nominal fit that is not believed
 OTHER_STARTS = (500.0, 3500.0)  # Pa

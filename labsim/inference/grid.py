@@ -180,13 +180,13 @@ class RunGrid:
             places.append((request, number, len(positions)))
         if not settings:
             return
-        runs = self.store.get_many(
+        runs = self.store.get_parts(
             settings,
+            parts,
             workers=self.workers,
             scheduler=self.scheduler,
             progress=self.progress,
             text=text,
-            parts=parts,
         )
         at = 0
         for request, number, count in places:

@@ -1,6 +1,6 @@
 """What a likelihood needs of a stored run: to read that alone takes a fifth to a third of the time of the whole.
 
-Each part has fields of DropRun, by the same names; ``RunStore.get_many`` reads what it is asked for. A new run is a
+Each part has fields of DropRun, by the same names; ``RunStore.get_parts`` reads what it is asked for. A new run is a
 whole DropRun, which serves as any part.
 """
 

@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from pathlib import Path
+from typing import Any, cast
 
 import filelock
 import platformdirs
@@ -67,7 +68,7 @@ class RunStore:
 
     def find(self, setting: DropSetting) -> DropRun | FailedRun | None:
         """The stored run of this setting and this solver, or None (also where its file is damaged)."""
-        return self._read(make_key(setting), setting)
+        return cast("DropRun | FailedRun | None", self._read(make_key(setting), setting))
 
     def _read(self, key: str, setting: DropSetting, part: Part = DropRun) -> AnyPart | FailedRun | None:
         try:
@@ -101,27 +102,32 @@ class RunStore:
             "again, finished runs are kept",
         )
 
-    def get_many(
+    def get_many(self, settings: Sequence[DropSetting], **how: Any) -> list[DropRun | FailedRun]:
+        """Whole runs of all settings, as ``get_parts`` gives them."""
+        found = self.get_parts(settings, [DropRun] * len(settings), **how)
+        return cast("list[DropRun | FailedRun]", found)
+
+    def get_parts(
         self,
         settings: Sequence[DropSetting],
+        parts: Sequence[Part],
         *,
         workers: int | None = None,
         scheduler: str | None = None,
         progress: Progress | None = None,
         text: str = "simulating",
-        parts: Sequence[Part] | None = None,
     ) -> list[AnyPart | FailedRun]:
         """Runs of all settings, in their order; equal settings are run once, the longest first.
 
-        progress is told the cost that is done and the cost of what was missing, so that the time left can be told.
-        parts : per setting, what is read of a run that is stored; the whole where nothing is said.
+        parts : per setting, what is read of a run that is stored. progress is told the cost that is done and the cost of what
+        was missing, so that the time left can be told.
         Raises InferenceError when a worker process dies; what was finished by then is stored.
         """
         report = progress or (lambda done, total, text: None)
         keys = [make_key(setting) for setting in settings]
         by_key = dict(zip(keys, settings, strict=True))
         part_by_key: dict[str, Part] = {}
-        for key, part in zip(keys, parts or [DropRun] * len(keys), strict=True):
+        for key, part in zip(keys, parts, strict=True):
             # asked for twice, as different parts: whole
             part_by_key[key] = part if part_by_key.get(key, part) is part else DropRun
         results: dict[str, AnyPart | FailedRun] = {}
@@ -159,7 +165,7 @@ class RunStore:
                         continue
                     except OSError as trouble:
                         raise self._refused(trouble) from None
-                    if (stored := self._read(key, setting)) is not None:  # finished elsewhere since we looked
+                    if (stored := self.find(setting)) is not None:  # finished elsewhere since we looked
                         lock.release()
                         self.reused += 1
                         yield key, stored

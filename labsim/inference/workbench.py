@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from ..effects import Effect, Instrument, Place, list_effects, list_places
-from ..effects.model import Model, apply_effects, check_model, make_instrument
+from ..effects import Effect, Instrument, Place
+from ..effects.model import Model, make_instrument
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
-from ..sph import DropRun, DropSetting
+from ..sph import DropRun
 from .curves import encode_run
-from .drop_model import DropModel, make_drop_model
+from .drop_model import DropModel
 from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import (
@@ -24,17 +24,11 @@ from .grid import (
     Family,
     Request,
     RunGrid,
-    few_positions,
-    speed_nodes,
 )
 from .nodes import amplitude_nodes, enclosing_nodes, screening_node
-from .observe import ObservedDrop, observe_drops
-from .runs import Progress, RunStore
-from .scans import ObservedScan, ScanModel, encode_scan_run
+from .observe import ObservedDrop
+from .scans import ScanModel, encode_scan_run
 from .undisturbed import UndisturbedDust
-
-SCAN_MARGIN = 1.06
-SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
 
 
 @dataclass
@@ -134,11 +128,11 @@ class Workbench:
         effect, values = self.effects[name], self.at(name, amplitude)
 
         def apply(setting):  # type: ignore[no-untyped-def]
-            return effect.apply(setting, values, self._place(setting.projectile.tip))
+            return effect.apply(setting, values, self.place_of(setting.projectile.tip))
 
         return apply
 
-    def _place(self, tip: str) -> Place:
+    def place_of(self, tip: str) -> Place:
         for place in self.places.values():
             if place.tip == tip:
                 return place
@@ -210,106 +204,6 @@ class Workbench:
 
     def costs_runs(self, name: str) -> bool:
         return self.effects[name].costs_runs and not self.strength_only(name)
-
-
-def open_workbench(
-    campaign: Campaign,
-    store: RunStore,
-    effects: Mapping[str, Effect],
-    *,
-    terms: Terms | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Progress | None = None,
-    cells: int | None = None,
-    drops: list[ObservedDrop] | None = None,
-    scans: Sequence[ObservedScan] = (),
-    undisturbed: Sequence[UndisturbedDust] = (),
-    model: Model | None = None,
-) -> Workbench:
-    """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
-    drops = drops if drops is not None else observe_drops(campaign)[0]
-    if not drops:
-        raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
-    families: list[Family] = []
-    members: dict[tuple, list[ObservedDrop]] = {}
-    for drop in drops:
-        p = drop.drop.projectile
-        members.setdefault((p.tip, p.tip_radius, round(p.mass, 12)), []).append(drop)
-    tables, models = [], []
-    for group in members.values():
-        nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
-        projectile = group[0].drop.projectile
-        stated = type(projectile)(projectile.tip, projectile.tip_radius, projectile.mass)
-        families.append(Family(stated, nodes, False, few))
-        table = ResponseTable(np.log(nodes), few)
-        tables.append(table)
-        models += [make_drop_model(drop, table) for drop in group]
-    scan_models = []
-    for (tip, radius, mass), group in _group_scans(scans).items():
-        nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in group], SCAN_MARGIN)
-        families.append(Family(Projectile(tip, radius, mass), nodes, True, few))
-        for scan in group:
-            scan_models.append(ScanModel(scan, ResponseTable(np.log(nodes), few)))
-    resolved, reasons = {}, {}
-    for name, effect in effects.items():
-        reason = effect.applies(campaign)
-        if reason:
-            reasons[name] = reason
-        else:
-            resolved[name] = effect.for_campaign(campaign)
-    grid = RunGrid(campaign, store, families, workers=workers, scheduler=scheduler, progress=progress)
-    if cells:
-        grid.cells = cells
-    places = list_places(campaign)
-    bench = Workbench(
-        campaign,
-        drops,
-        grid,
-        families,
-        places,
-        resolved,
-        terms or Terms(),
-        tables,
-        models,
-        reasons,
-        scan_models,
-        list(undisturbed),
-    )
-    if model is not None:
-        extend(bench, model)
-    return bench
-
-
-def extend(bench: Workbench, model: Model) -> None:
-    """Take a model's effects and material into the nominal model; its p_m stays what is looked for.
-
-    Raises EffectError where one of its effects cannot be at work in this campaign.
-    """
-    check_model(model, bench.campaign, list_effects(bench.campaign), bench.campaign.folder)
-    held = [(name, values) for name, values in model.effects if not bench.strength_only(name)]
-
-    def apply(setting: DropSetting) -> DropSetting:
-        setting = setting.replace(material=setting.material.replace(**dict(model.material)))
-        return apply_effects(setting, held, bench._place(setting.projectile.tip), bench.effects)
-
-    bench.model = model
-    bench.grid.extension = apply
-
-
-def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
-    slowest, fastest = min(speeds) / margin, max(speeds) * margin
-    nodes = speed_nodes(slowest, fastest)
-    return nodes, few_positions(nodes, slowest, fastest)
-
-
-def _group_scans(scans: Sequence[ObservedScan]) -> dict[tuple, list[ObservedScan]]:
-    groups: dict[tuple, list[ObservedScan]] = {}
-    for scan in scans:
-        p = scan.scan.projectile
-        groups.setdefault((p.tip, p.tip_radius, p.mass), []).append(scan)
-    return groups
 
 
 def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: bool) -> int:

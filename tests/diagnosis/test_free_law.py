@@ -20,9 +20,9 @@ from labsim.effects import Place, list_effects
 from labsim.inference.blocks import Block
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.likelihood import solve_globals
+from labsim.inference.open_workbench import open_workbench
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
-from labsim.inference.workbench import open_workbench
 from labsim.sph import DropSetting
 from labsim.sph.materials.porous_dust import tabulate_strengths
 

@@ -97,16 +97,16 @@ def test_many_workers_give_the_numbers_of_one(tmp_path: Path) -> None:
 def test_parts_of_a_stored_run_are_those_of_the_whole(tmp_path: Path) -> None:
     store, settings = RunStore(tmp_path), [small_drop(0.2), small_drop(0.3)]
     first, second = require_runs(store.get_many(settings, workers=1))
-    motion, dust = store.get_many(settings, workers=1, parts=[Motion, Compaction])
+    motion, dust = store.get_parts(settings, [Motion, Compaction], workers=1)
     times = np.linspace(-1e-4, 1.2 * first.stopping_time, 50)
     assert isinstance(motion, Motion) and np.array_equal(motion.depth_at(times), first.depth_at(times))
     assert np.array_equal(encode_run(motion), encode_run(first))
     assert isinstance(dust, Compaction) and dust.penetration_depth == second.penetration_depth
     for name in ("r", "z", "volume", "filling_factor"):
         assert np.array_equal(getattr(dust.particles, name), getattr(second.particles, name))
-    both = store.get_many([small_drop(), small_drop()], workers=1, parts=[Motion, Compaction])
+    both = store.get_parts([small_drop()] * 2, [Motion, Compaction], workers=1)
     assert all(isinstance(run, DropRun) for run in both)  # asked for as two parts, and new
-    both = store.get_many([small_drop(), small_drop()], workers=1, parts=[Motion, Compaction])
+    both = store.get_parts([small_drop()] * 2, [Motion, Compaction], workers=1)
     assert all(isinstance(run, DropRun) and same(run, second) for run in both)
 
 

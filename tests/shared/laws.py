@@ -39,7 +39,7 @@ def move(radius: float, mass: float, speed: float, p_m: float, rate: float = 0.0
 class LawStore(RunStore):
     """Answers every setting at once with the law; keeps no file."""
 
-    def get_many(self, settings, **options):  # type: ignore[no-untyped-def]
+    def get_parts(self, settings, parts, **options):  # type: ignore[no-untyped-def]
         self.new += len(settings)
         return [run_law(setting) for setting in settings]
 
