@@ -20,9 +20,9 @@ from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
-from .free_law import fit_hats, is_wanted
-from .gain import Gain, HeldOut, measure_gain, predict_held_out
-from .judge import Verdict, judge
+from .free_law import FAILED, fit_hats, is_wanted
+from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
+from .judge import PREDICTED, Verdict, judge
 from .pairs import confirm_pairs, return_to_singles, settle_leading
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
@@ -40,7 +40,10 @@ MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes ab
 
 @dataclass(frozen=True)
 class Judgement:
-    """What is at work in a campaign, before any posterior is sampled. best : the fit that the verdict rests on."""
+    """What is at work in a campaign, before any posterior is sampled. best : the fit that the verdict rests on.
+
+    p_value : of the nominal model; predicted : of held-out drops with the best listed cause, 1 where it was not asked for.
+    """
 
     campaign: Campaign
     bench: Workbench
@@ -50,6 +53,7 @@ class Judgement:
     unknown: UnknownFit
     verdict: Verdict
     p_value: float
+    predicted: float
     best: Fit
 
 
@@ -87,7 +91,11 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
     pairs = settle_leading(bench, rivals, pairs, unknown.evidence)
     rivals = return_to_singles(bench, rivals, pairs) + pairs
-    if is_wanted(p_value, rivals, unknown.evidence):
+    predicted = 1.0
+    if p_value < FAILED and rivals:
+        leading = max(rivals, key=lambda fit: fit.evidence)
+        predicted = check_prediction(bench, leading, np.random.default_rng(seed))
+    if is_wanted(p_value, rivals, unknown.evidence, predicted):
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
     verdict = judge(
         nominal,
@@ -95,13 +103,16 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
         unknown.evidence,
         list(bench.effects),
         {score.name: score.log_bayes for score in screening.scores},
+        predicted,
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it
         best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
-    return Judgement(bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, best)
+    return Judgement(
+        bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, predicted, best
+    )
 
 
 def diagnose_campaign(
@@ -137,6 +148,12 @@ def diagnose_campaign(
     )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
+    if found.predicted < PREDICTED:
+        leading = max(found.rivals, key=lambda fit: fit.evidence)
+        warnings.append(
+            f"of the listed causes {' with '.join(leading.hypothesis)} explains most, but it does not predict drops that no fit "
+            f"has seen (p = {found.predicted:.2g}): something that is not listed may be at work"
+        )
     if found.verdict.word == "unknown":
         warnings.append(
             f"p_m is not measured while the cause is unknown: {np.median(posterior.samples('p_m_Pa')):.4g} Pa without, "

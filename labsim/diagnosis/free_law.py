@@ -95,13 +95,15 @@ class Marginal:
     covariance: FloatArray
 
 
-def is_wanted(p_value: float, rivals: Sequence[Fit], without_place: float) -> bool:
-    """Whether a law in the equations can matter: the nominal model fails, and no listed cause both fits and stands far ahead of
-    ``without_place``, ln evidence of the laws that cost no runs."""
+def is_wanted(p_value: float, rivals: Sequence[Fit], without_place: float, predicted: float = 1.0) -> bool:
+    """Whether a law in the equations can matter: the nominal model fails, and no listed cause fits, predicts held-out drops
+    (``predicted``, p value of the best) and stands far ahead of ``without_place``, ln evidence of the laws that cost no runs."""
     best = max(rivals, key=lambda fit: fit.evidence, default=None)
     if p_value >= FAILED:
         return False
-    return best is None or goodness_of_fit(best) < EXPLAINED or best.evidence < without_place + AHEAD
+    if best is None or best.evidence < without_place + AHEAD:
+        return True
+    return min(goodness_of_fit(best), predicted) < EXPLAINED
 
 
 def fit_hats(bench: Workbench, fit: Fit) -> Tangents:

@@ -17,6 +17,8 @@ from ..inference.fitting import Fit
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 
+DRAWS = 4000  # of the null law
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -39,15 +41,28 @@ class Gain:
     fraction_removed: float
 
 
-def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> HeldOut:
-    """Leave each drop out, fit the globals to the others, predict its motion below the surface.
+@dataclass(frozen=True)
+class _HeldDrop:
+    """One drop held out: errors of its prediction are linear in the data. held, seen : (n,) which; design : (n, k) of all."""
 
-    A single drop leaves nothing to predict it from: its figures are NaN. known : the globals are held where the fit has them.
-    """
+    held: np.ndarray
+    seen: np.ndarray
+    design: FloatArray
+    solved: FloatArray  # C⁻¹ times the design of what is seen
+    weights: FloatArray  # (held, seen) of its own errors that the others tell
+    covariance: FloatArray  # (k, k) of the globals without it
+    spread: FloatArray  # (held, held) of its prediction
+
+    def miss(self, residual: FloatArray, pull: FloatArray) -> FloatArray:
+        """Data minus prediction, (held, ...), for residuals (n, ...) and what scans and priors say of the globals, (k, ...)."""
+        best = self.covariance @ (self.solved.T @ residual[self.seen] + pull)
+        left = residual[self.seen] - self.design[self.seen] @ best
+        return residual[self.held] - self.design[self.held] @ best - self.weights @ left
+
+
+def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop], FloatArray, FloatArray]:
+    """Every drop held out; what scans and priors say of the globals: pull (k,) and precision (k, k)."""
     linear = fit.linear
-    if len(fit.models) < 2:
-        nothing = np.full(1, math.nan)
-        return HeldOut((fit.models[0].observed.name,), nothing, nothing, nothing, np.ones(1))
     names = [] if known else ["ln_p_m", *fit.hypothesis]
     design = _stack(linear.tangents, names, linear.residual.size)
     precision = np.zeros((len(names), len(names)))
@@ -61,7 +76,7 @@ def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> Held
         solved = block.solve(columns)
         precision += columns.T @ solved
         pull += solved.T @ block.residual
-    rms, expected, score, count = [], [], [], []
+    drops = []
     for model in fit.models:
         section = linear.sections[model.observed.name]
         data = model.matrix @ model.observed.depth
@@ -73,28 +88,54 @@ def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> Held
         factor = cho_factor(linear.covariance[np.ix_(seen, seen)], lower=True)
         cross = linear.covariance[np.ix_(held, seen)]
         solved = cho_solve(factor, design[seen])
-        information = design[seen].T @ solved + precision
-        covariance = np.linalg.inv(information)
-        best = covariance @ (solved.T @ linear.residual[seen] + pull)
-        left = linear.residual[seen] - design[seen] @ best
-        mean = design[held] @ best + cross @ cho_solve(factor, left)
+        covariance = np.linalg.inv(design[seen].T @ solved + precision)
+        weights = cho_solve(factor, cross.T).T
         reach = design[held] - cross @ solved
-        spread = (
-            linear.covariance[np.ix_(held, held)]
-            - cross @ cho_solve(factor, cross.T)
-            + reach @ covariance @ reach.T
-        )
-        error = linear.residual[held] - mean
-        lower = np.linalg.cholesky(spread)
+        spread = linear.covariance[np.ix_(held, held)] - weights @ cross.T + reach @ covariance @ reach.T
+        drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread))
+    return drops, pull, precision
+
+
+def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> HeldOut:
+    """Leave each drop out, fit the globals to the others, predict its motion below the surface.
+
+    A single drop leaves nothing to predict it from: its figures are NaN. known : the globals are held where the fit has them.
+    """
+    names = tuple(model.observed.name for model in fit.models)
+    if len(fit.models) < 2:
+        nothing = np.full(1, math.nan)
+        return HeldOut(names, nothing, nothing, nothing, np.ones(1))
+    rms, expected, score, count = [], [], [], []
+    drops, pull, _precision = _hold_out(bench, fit, known)
+    for drop in drops:
+        error = drop.miss(fit.linear.residual, pull)
+        lower = np.linalg.cholesky(drop.spread)
         white = np.linalg.solve(lower, error)
         score.append(
             -0.5 * white @ white - np.sum(np.log(np.diag(lower))) - 0.5 * error.size * math.log(2 * math.pi)
         )
         rms.append(math.sqrt(np.mean(error**2)))
-        expected.append(math.sqrt(np.mean(np.diag(spread))))
+        expected.append(math.sqrt(np.mean(np.diag(drop.spread))))
         count.append(error.size)
-    order = tuple(model.observed.name for model in fit.models)
-    return HeldOut(order, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
+    return HeldOut(names, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
+
+
+def check_prediction(bench: Workbench, fit: Fit, random: np.random.Generator, draws: int = DRAWS) -> float:
+    """p value: how often held-out drops of a true model miss by as much, in the mean square over all of them.
+
+    A fault that is smooth along the way is a few directions among hundreds of data, where χ² does not show it; what one drop
+    says of another is few numbers. Its null law is drawn: data of the fitted model's own covariance. 1 with a single drop.
+    """
+    if len(fit.models) < 2:
+        return 1.0
+    drops, pull, precision = _hold_out(bench, fit, known=False)
+    lower = np.tril(fit.linear.drops.lower)
+    residuals = lower @ random.standard_normal((len(lower), draws))
+    values, axes = np.linalg.eigh(precision)
+    pulls = axes * np.sqrt(np.maximum(values, 0.0)) @ random.standard_normal((len(values), draws))
+    seen = sum(float(np.sum(drop.miss(fit.linear.residual, pull) ** 2)) for drop in drops)
+    drawn = sum(np.sum(drop.miss(residuals, pulls) ** 2, axis=0) for drop in drops)
+    return float((1 + np.count_nonzero(drawn >= seen)) / (1 + draws))
 
 
 def _stack(tangents: Mapping[str, FloatArray], names: Sequence[str], rows: int) -> FloatArray:

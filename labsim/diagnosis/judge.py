@@ -15,6 +15,7 @@ TEMPERATURE = 3.0  # among causes: what tells one from another rests on details 
 # of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
 # most 5.5, the weakest that was 9.6
 NESTED = 2.0
+PREDICTED = 0.05  # p value of the best cause's held-out drops below which a cause that is not listed gets the odds that it allows
 NAMED = 0.9  # probability that what a verdict names holds together
 MOST_NAMED = 3
 
@@ -46,6 +47,7 @@ def judge(
     unknown_evidence: float,
     catalogue: Sequence[str],
     screened: Mapping[str, float],
+    predicted: float = 1.0,
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
@@ -53,7 +55,9 @@ def judge(
     off behind it by the difference of their gains over TEMPERATURE (NESTED where they are part of the best): they are told apart
     by residuals of the size of the solver's own error.
 
-    screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated.
+    screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
+    p value of held-out drops with the best cause. Where they are missed, unknown stands to that cause at least as its prior does
+    to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p): Sellke et al. (2001).
     """
     singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
     pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
@@ -72,6 +76,11 @@ def judge(
         softened = NESTED if set(hypothesis) < ahead else TEMPERATURE
         tempered = most - (most - max(value, 0.0)) / softened + min(value, 0.0)
         weight[hypothesis] = math.log(prior) + nominal.evidence + tempered
+    if predicted < PREDICTED:
+        bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
+        odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
+        first = max(value for hypothesis, value in weight.items() if hypothesis[0] not in ("none", "unknown"))
+        weight[("unknown",)] = max(weight[("unknown",)], first + odds)
     top = max(weight.values())
     total = sum(math.exp(value - top) for value in weight.values())
     ranked = sorted(

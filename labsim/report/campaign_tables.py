@@ -9,6 +9,7 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
+from ..diagnosis.judge import PREDICTED
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..inference.calibrate import Calibration
@@ -122,6 +123,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             "log_score_difference": gain.log_score_difference,
             "log_score_difference_sigma": gain.log_score_difference_sigma,
             "fraction_of_discrepancy_removed": gain.fraction_removed,
+            "p_value": found.predicted,
             "extension": list(found.best.hypothesis),
             "drops": [
                 {"name": name, "rms_nominal_m": float(a), "rms_extended_m": float(b)}
@@ -156,9 +158,15 @@ def say_verdict(found: Diagnosis) -> str:
             f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
         )
     if found.verdict.word == "unknown":
+        missing = f"what is missing {say_missing(found)}"
+        if found.predicted < PREDICTED and found.best.evidence > found.unknown.evidence:
+            missing = (
+                f"{say_hypothesis(found.best.hypothesis)} comes nearest, but does not predict drops that no fit has seen "
+                f"(p = {found.predicted:.2g})"
+            )
         return (
-            f"The simulation is wrong in a way that no listed cause explains (probability {say_probability(probability)}): "
-            f"what is missing {say_missing(found)}."
+            "The simulation is wrong in a way that no listed cause explains (probability "
+            f"{say_probability(probability)}): {missing}."
         )
     parts = []
     for name in best:

@@ -79,6 +79,24 @@ def test_probabilities_follow_bayes():
     assert verdict.word == "effect"
 
 
+@pytest.mark.parametrize(
+    ("predicted", "word"), [(1.0, "effect"), (0.06, "effect"), (0.03, "effect"), (0.01, "unknown")]
+)
+def test_a_cause_that_does_not_predict_held_out_drops_stands_back_behind_unknown(predicted, word):
+    catalogue = ["a", "b", "c", "d"]
+    verdict = judge(fake_fit((), 0.0), [fake_fit(("a",), 90.0)], -1.0, catalogue, {"b": 2.0}, predicted)
+    found = dict(verdict.probabilities)
+    assert verdict.word == word
+    if (
+        predicted < 0.05
+    ):  # prior odds of what is not listed, times the bound of Sellke, Bayarri & Berger (2001), their eq. 2
+        odds = 0.1 / 0.4 / (-math.e * predicted * math.log(predicted))
+        assert found["unknown",] / found["a",] == pytest.approx(odds)
+    else:
+        assert found["unknown",] < 1e-30
+    assert sum(found.values()) == pytest.approx(1.0)
+
+
 def test_a_pair_must_earn_its_second_effect():
     catalogue = ["a", "b", "c", "d"]
     single = fake_fit(("a",), 50.0)

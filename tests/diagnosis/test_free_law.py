@@ -120,21 +120,24 @@ def test_a_law_over_sizes_is_as_wide_as_they_differ() -> None:
 
 
 @pytest.mark.parametrize(
-    ("p_value", "best", "wanted"),
+    ("p_value", "best", "predicted", "wanted"),
     [
-        (0.5, None, False),  # nothing is wrong
-        (0.001, None, True),
-        (0.001, (0.5, 40.0), False),  # a listed cause fits, far ahead
-        (0.001, (0.5, 25.0), True),  # fits, but hardly better than a law without a place
-        (0.001, (0.01, 40.0), True),  # best of those listed, and does not fit
+        (0.5, None, 1.0, False),  # nothing is wrong
+        (0.001, None, 1.0, True),
+        (0.001, (0.5, 40.0), 0.3, False),  # a listed cause fits, far ahead
+        (0.001, (0.5, 25.0), 0.3, True),  # fits, but hardly better than a law without a place
+        (0.001, (0.01, 40.0), 0.3, True),  # best of those listed, and does not fit
+        (0.001, (0.5, 40.0), 0.01, True),  # fits, but does not predict held-out drops
     ],
 )
-def test_runs_of_hats_are_made_only_where_they_can_matter(monkeypatch, p_value, best, wanted) -> None:
+def test_runs_of_hats_are_made_only_where_they_can_matter(
+    monkeypatch, p_value, best, predicted, wanted
+) -> None:
     rivals = []
     if best is not None:
         monkeypatch.setattr(free_law, "goodness_of_fit", lambda fit: best[0])
         rivals = [SimpleNamespace(evidence=best[1]), SimpleNamespace(evidence=0.0)]
-    assert is_wanted(p_value, rivals, 20.0) is wanted
+    assert is_wanted(p_value, rivals, 20.0, predicted) is wanted
 
 
 # ---------------------------------------------------------------- the hats

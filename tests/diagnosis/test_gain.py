@@ -1,13 +1,15 @@
 """Held-out drops against the conditional normal distribution worked out another way, and the gain against its formula."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import kstest, multivariate_normal
 
-from labsim.diagnosis.gain import HeldOut, measure_gain, predict_held_out
+from labsim.diagnosis.gain import HeldOut, check_prediction, measure_gain, predict_held_out
+from labsim.inference.blocks import Block
 from labsim.inference.likelihood import Linearised
 
 POINTS, DROPS, WIDE, SCALE = 6, 5, 100.0, 0.3
@@ -80,6 +82,38 @@ def test_drops_miss_by_what_is_expected_of_a_true_model_and_by_more_of_a_wrong_o
     assert np.mean(right) == pytest.approx(1.0, abs=3 * np.std(right) / math.sqrt(len(right)))
     assert np.std(right) / math.sqrt(len(right)) < 0.1
     assert np.mean(wrong) > 3.0
+
+
+def test_the_check_of_a_prediction_is_uniform_for_a_true_model_and_small_for_a_wrong_one():
+    true, wrong = [], []
+    for seed in range(100):
+        for hidden, found in ((0.0, true), (5.0, wrong)):
+            bench, fit = make_fit(seed, hidden=hidden)
+            fit.hypothesis = ()
+            found.append(check_prediction(bench, fit, np.random.default_rng(seed), draws=400))
+    assert kstest(true, "uniform").pvalue > 0.01
+    assert np.mean(np.array(true) < 0.05) <= 0.12  # 5 % and three standard deviations of a hundred
+    assert np.mean(np.array(wrong) < 0.05) > 0.9
+
+
+def test_what_a_prior_and_a_scan_say_of_the_globals_is_drawn_as_well():
+    """An amplitude drawn from its prior, and a scan that tells it: still uniform."""
+    found = []
+    for seed in range(100):
+        random = np.random.default_rng(1000 + seed)
+        amplitude = random.normal(0, SCALE)
+        bench, fit = make_fit(seed, hidden=amplitude)
+        tangents = {"ln_p_m": np.zeros(8), EFFECT: np.full(8, 3.0)}
+        block = Block(tangents[EFFECT] * amplitude + random.normal(size=8), np.eye(8), tangents)
+        fit.linear = replace(fit.linear, scans=(block,))
+        found.append(check_prediction(bench, fit, random, draws=400))
+    assert kstest(found, "uniform").pvalue > 0.01
+
+
+def test_a_single_drop_leaves_nothing_to_check():
+    bench, fit = make_fit(1)
+    fit.models = fit.models[:1]
+    assert check_prediction(bench, fit, np.random.default_rng(1)) == 1.0
 
 
 def test_the_gain_is_the_share_of_the_mean_square_above_the_noise():

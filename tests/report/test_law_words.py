@@ -7,6 +7,8 @@ import pytest
 
 from labsim.diagnosis.free_law import RecoveredLaw
 from labsim.diagnosis.hats import FreeLaw
+from labsim.diagnosis.judge import Verdict
+from labsim.report.campaign_tables import say_verdict
 from labsim.report.law_words import say_missing, size_of_missing
 
 DEPTH = FreeLaw(
@@ -41,3 +43,29 @@ def test_what_is_not_clear_is_not_named_beside_it(found):
     depth = found.unknown.laws[1]
     found.unknown.laws = (a_law(SPEED, [5.0, 3.0], 5.0), depth)
     assert say_missing(found).endswith("at a depth of 1 tip radius")
+
+
+@pytest.mark.parametrize(
+    ("predicted", "evidence", "said"),
+    [
+        (
+            0.004,
+            1600.0,
+            "strength_rate comes nearest, but does not predict drops that no fit has seen (p = 0.004).",
+        ),
+        (
+            0.004,
+            1500.0,
+            "what is missing acts like a force on the tip of 205",
+        ),  # the law explains more than any listed cause
+        (0.3, 1600.0, "what is missing acts like a force on the tip of 205"),
+    ],
+)
+def test_a_listed_cause_that_comes_nearest_is_said_to(found, predicted, evidence, said):
+    found.verdict = Verdict("unknown", [(("unknown",), 0.8), (("strength_rate",), 0.2)])
+    found.posterior_nominal = SimpleNamespace(samples=lambda name: np.array([1300.0]))
+    found.predicted, found.unknown.evidence = predicted, 1526.0
+    found.best = SimpleNamespace(hypothesis=("strength_rate",), evidence=evidence)
+    assert say_verdict(found).startswith(
+        "The simulation is wrong in a way that no listed cause explains (probability 0.80): " + said
+    )
