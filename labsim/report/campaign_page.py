@@ -18,7 +18,7 @@ from .cause_words import BADGES, describe_causes, describe_gain, list_confusable
 from .drop_views import DropView
 from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
 from .law_figures import plot_law
-from .law_words import describe_laws, size_of_missing
+from .law_words import comes_nearest, describe_laws, size_of_missing
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
@@ -69,7 +69,7 @@ def write_campaign_page(
         ),
     ]
     if found.verdict.word == "unknown":
-        if size := size_of_missing(found):
+        if not comes_nearest(found) and (size := size_of_missing(found)):
             tiles.append(("what is missing", *size))
     elif len(labels) > 1:
         percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
-from ..diagnosis.judge import PREDICTED
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..inference.calibrate import Calibration
@@ -17,7 +16,7 @@ from ..inference.posterior import Posterior
 from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..sph import solver_hash
-from .law_words import describe_unknown, say_missing
+from .law_words import comes_nearest, describe_unknown, say_missing
 from .phrases import CERTAIN, say_amount, say_hypothesis, say_probability
 
 NUMERICAL_DEPTH = (
@@ -159,7 +158,7 @@ def say_verdict(found: Diagnosis) -> str:
         )
     if found.verdict.word == "unknown":
         missing = f"what is missing {say_missing(found)}"
-        if found.predicted < PREDICTED and found.best.evidence > found.unknown.evidence:
+        if comes_nearest(found):
             missing = (
                 f"{say_hypothesis(found.best.hypothesis)} comes nearest, but does not predict drops that no fit has seen "
                 f"(p = {found.predicted:.2g})"

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.free_law import EMBEDDED, RecoveredLaw
+from ..diagnosis.judge import PREDICTED
 from .page import show_number
 
 MISSING = {
@@ -34,6 +35,11 @@ def say_missing(found: Diagnosis) -> str:
     first, *rest = _rank(found)
     parts = [f"a {law.law.name}" for law in rest if _clearness(law) > CLEAR]
     return f"acts like {say_law(first)}" + (f" (with parts of {' and '.join(parts)})" if parts else "")
+
+
+def comes_nearest(found: Diagnosis) -> bool:
+    """Whether a listed cause explains more than any law without a name, and is set back because held-out drops are missed."""
+    return found.predicted < PREDICTED and found.best.evidence > found.unknown.evidence
 
 
 def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
