@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
 
@@ -56,6 +57,11 @@ class Judgement:
     predicted: float
     best: Fit
 
+    @property
+    def leading(self) -> Fit:
+        """The listed cause, or pair, that explains most; the nominal fit where none was fitted."""
+        return find_leading(self.rivals, self.nominal)
+
 
 @dataclass(frozen=True)
 class Diagnosis(Judgement):
@@ -91,9 +97,9 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
     pairs = settle_leading(bench, rivals, pairs, unknown.evidence)
     rivals = return_to_singles(bench, rivals, pairs) + pairs
+    leading = find_leading(rivals, nominal)
     predicted = 1.0
     if p_value < FAILED and rivals:
-        leading = max(rivals, key=lambda fit: fit.evidence)
         predicted = check_prediction(bench, leading, np.random.default_rng(seed))
     if is_wanted(p_value, rivals, unknown.evidence, predicted):
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
@@ -107,7 +113,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it
-        best = max(rivals, key=lambda fit: fit.evidence, default=nominal)
+        best = leading
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
     return Judgement(
@@ -149,9 +155,8 @@ def diagnose_campaign(
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
     if found.predicted < PREDICTED:
-        leading = max(found.rivals, key=lambda fit: fit.evidence)
         warnings.append(
-            f"of the listed causes {' with '.join(leading.hypothesis)} explains most, but it does not predict drops that no fit "
+            f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not predict drops that no fit "
             f"has seen (p = {found.predicted:.2g}): something that is not listed may be at work"
         )
     if found.verdict.word == "unknown":
@@ -183,6 +188,11 @@ def diagnose_campaign(
         wall=time.perf_counter() - began,
         warnings=tuple(warnings),
     )
+
+
+def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:
+    """The rival with most evidence; the nominal fit where there is none."""
+    return max(rivals, key=lambda fit: fit.evidence, default=nominal)
 
 
 def _predict(bench: Workbench, fit: Fit, seed: int, progress: Progress | None) -> tuple[HeldOut, Posterior]:

@@ -79,7 +79,7 @@ def judge(
     if predicted < PREDICTED:
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
-        first = max(value for hypothesis, value in weight.items() if hypothesis[0] not in ("none", "unknown"))
+        first = max(weight[hypothesis] for hypothesis in gain)
         weight[("unknown",)] = max(weight[("unknown",)], first + odds)
     top = max(weight.values())
     total = sum(math.exp(value - top) for value in weight.values())

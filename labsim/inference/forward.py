@@ -55,6 +55,7 @@ class ResponseTable:
 
     def stack(self, codes: Mapping[float, FloatArray]) -> FloatArray:
         """The codes of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""
+        # ids of a table that came from another process mean nothing: the mapping itself is compared
         known, stacked = self._stacks.get(id(codes), (None, None))
         if stacked is None or known is not codes or len(stacked) != sum(map(len, codes.values())):
             stacked = np.concatenate(list(codes.values()))
