@@ -156,8 +156,8 @@ def diagnose_campaign(
     warnings += warn_unused_scans(bench)
     if found.predicted < PREDICTED:
         warnings.append(
-            f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not predict drops that no fit "
-            f"has seen (p = {found.predicted:.2g}): something that is not listed may be at work"
+            f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not predict "
+            f"drops that no fit has seen (p = {found.predicted:.2g}): something that is not listed may be at work"
         )
     if found.verdict.word == "unknown":
         warnings.append(
