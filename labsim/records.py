@@ -43,7 +43,7 @@ class Material:
     """Strengths and elasticity of the dust (campaign.toml ``[material]``), p_m included.
 
     Σ(φ) = p_m ((φ - φ1)/(φ2 - φ))^(Δ ln 10); T(φ) = -10^(a + b φ) Pa; Y = shear_factor √(Σ|T|);
-    K(φ) = bulk_modulus (φ/0.15)^bulk_exponent; μ = shear_to_bulk K. Source: Güttler et al. (2009), eqs. 3-5.
+    K(φ) = bulk_modulus (φ/0.15)^bulk_exponent; μ = shear_to_bulk K. Source: Güttler et al. (2009), eqs. 4-6.
     """
 
     p_m: float = 1300.0  # Pa

@@ -1,6 +1,6 @@
 """The dust's law for one material point: strengths, pressure with its zero-stress filling factor, radial return.
 
-Equations: Güttler et al. (2009) eqs. 3-5; the exponent of K is 4. Everything in SI.
+Equations: Güttler et al. (2009) eqs. 4-6; the exponent of K is 4. Everything in SI.
 """
 
 from __future__ import annotations

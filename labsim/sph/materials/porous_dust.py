@@ -1,4 +1,4 @@
-"""Porous dust: elastic-plastic, with the modified Sirono equation of state of Güttler et al. (2009), eqs. 3-5.
+"""Porous dust: elastic-plastic, with the modified Sirono equation of state of Güttler et al. (2009), eqs. 4-6.
 
     p = Σ(φ) on compaction, K(φ0') (φ/φ0' - 1) between, T(φ) on extension; φ0' is the filling factor at zero stress
     Σ(φ) = p_m ((φ - φ1)/(φ2 - φ))^(Δ ln 10),  T(φ) = -10^(a + bφ) Pa,  Y(φ) = shear_factor √(Σ|T|)
@@ -26,7 +26,7 @@ TABLE_TOP = 0.75  # φ of the last entry
 
 
 def compressive_strength(filling_factor: FloatArray, material: Material) -> FloatArray:
-    """Σ(φ) in Pa, continued beyond its poles as the module says. Güttler et al. (2009), eq. 5."""
+    """Σ(φ) in Pa, continued beyond its poles as the module says. Güttler et al. (2009), eq. 6."""
     phi = np.asarray(filling_factor, dtype=float)
     low, high = material.phi_1 + EDGE, material.phi_2 - EDGE
     inside = np.clip(phi, low, high)
@@ -38,7 +38,7 @@ def compressive_strength(filling_factor: FloatArray, material: Material) -> Floa
 
 
 def tensile_strength(filling_factor: FloatArray, material: Material) -> FloatArray:
-    """T(φ) in Pa, negative. Güttler et al. (2009), eq. 4."""
+    """T(φ) in Pa, negative. Güttler et al. (2009), eq. 5."""
     phi = np.asarray(filling_factor, dtype=float)
     return -(10.0 ** (material.tensile_log10_a + material.tensile_log10_b * phi))
 
