@@ -1,4 +1,4 @@
-"""The compiled loop over time steps: leapfrog, one evaluation of the forces a step, plastic state committed once a step."""
+"""The compiled loop over time steps: symplectic Euler, one evaluation of the forces each, plastic state committed once a step."""
 
 from __future__ import annotations
 

@@ -164,6 +164,7 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     dust, wall = place_particles(setting)
     body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
     watch = None if progress is None else lambda reached, state: progress(reached)
+    _fill_elastic(setting, dust)
     result = evolve(setting, dust, wall, body, watch)
     per_unit = 2 * math.pi if setting.geometry == "axisymmetric" else 1.0
     return make_run(

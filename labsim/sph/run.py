@@ -10,6 +10,7 @@ import numpy as np
 from ..records import FloatArray
 from . import particles as rows
 from ._jit import solver_hash
+from .materials.porous_dust import gas_energy
 from .setting import DropSetting
 
 CURVE_POINTS = 500  # kept of the curve, at most
@@ -101,25 +102,30 @@ def make_run(
     body_kinetic = 0.5 * body_mass * log[-1, 2] ** 2
     fallen = body_mass * log[-1, 1] - float(np.sum(mass * (at_end[rows.Z] - at_start[rows.Z])))
     stress_work = float(np.sum(mass * at_end[rows.WORK]))
-    elastic_0 = 0.5 * float(
+    elastic = float(np.sum(mass * (at_end[rows.ELASTIC] - at_start[rows.ELASTIC])))
+    gas = float(
         np.sum(
-            mass * at_start[rows.PRESSURE] ** 2 / (at_start[rows.DENSITY] ** 2 * at_start[rows.SOUND] ** 2)
+            mass
+            * gas_energy(
+                at_end[rows.DENSITY], at_end[rows.INITIAL], setting.pore_gas, setting.monomer_density
+            )
         )
     )
-    elastic = float(np.sum(mass * at_end[rows.ELASTIC])) - elastic_0
     energies = {
         "kinetic_at_contact": kinetic_0,
         "gravity": setting.gravity * fallen,
         "kinetic": dust_kinetic + body_kinetic,
         "elastic": elastic,
-        "plastic": stress_work - elastic,
+        "gas": gas,
+        "plastic": stress_work - elastic - gas,
         "viscous": float(log[-1, 6]),
         "friction": float(log[-1, 7]),
         "outside": float(log[-1, 9]),
         "contact": float(log[-1, 8]),
     }
     spent = sum(
-        energies[k] for k in ("kinetic", "elastic", "plastic", "viscous", "friction", "outside", "contact")
+        energies[k]
+        for k in ("kinetic", "elastic", "gas", "plastic", "viscous", "friction", "outside", "contact")
     )
     energy_error = (kinetic_0 + energies["gravity"] - spent) / kinetic_0
     viscous_share = float(log[stop, 6]) / (kinetic_0 + body_mass * setting.gravity * log[stop, 1])

@@ -12,6 +12,10 @@ import pytest
 from labsim.errors import SimulationError
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, Numerics, _jit, check_setting, particles, simulate
+from labsim.sph import drop as drop_module
+from labsim.sph.advance import LOG
+from labsim.sph.materials import porous_dust
+from labsim.sph.run import make_run
 
 RADIUS = 5e-4
 MASS = 2540 * 4 / 3 * math.pi * RADIUS**3
@@ -70,6 +74,62 @@ def test_books_with_friction_and_with_a_sphere(changes, drop):
     if "material" in changes:
         assert run.energies["friction"] > 0
         assert run.penetration_depth < drop.penetration_depth
+
+
+def test_dust_that_stays_as_it_is_gives_no_energy():
+    """The dust starts under its own weight: what it holds of elastic energy then is not booked as work of the drop."""
+    setting = a_drop(material=Material(bulk_modulus=4500.0))
+    dust, wall = particles.place_particles(setting)
+    drop_module._fill_elastic(setting, dust)
+    assert np.sum(dust[particles.MASS] * dust[particles.ELASTIC]) > 0
+    log = np.zeros((2, len(LOG)))
+    log[:, 2] = setting.impact_speed
+    run = make_run(setting, log, None, dust, dust, dust, wall, 2 * math.pi, 0, 1.0)
+    assert run.energies["elastic"] == 0.0
+    assert run.energies["plastic"] == 0.0
+
+
+def test_energy_of_trapped_gas_comes_back():
+    """Dust with gas, pressed by 5 % and not yielding: none of the work that the law books is plastic."""
+    setting = a_drop(material=Material(p_m=1e9, tensile_log10_a=9.0), pore_gas=2e4, gravity=0.0)
+    dust, wall = particles.place_particles(setting)
+    pressed = dust.copy()
+    m, n, rate, steps = setting.material, dust.shape[1], -0.05 / 3, 1000
+    law = (
+        2000.0,
+        m.bulk_modulus,
+        m.bulk_exponent,
+        m.shear_to_bulk,
+        m.shear_factor,
+        0.0,
+        0.5,
+        setting.pore_gas,
+    )
+    names = "density zero_stress initial sxx szz sxz pressure sound work compressive tensile"
+    state = [pressed[particles.ROWS.index(name)] for name in names.split()]
+    gradient = [np.full(n, rate), np.zeros(n), np.zeros(n), np.full(n, rate)]
+    for _ in range(steps):
+        porous_dust.update_stress(
+            0, n, 1 / steps, True, False, law, *porous_dust.tabulate_strengths(m), np.ones(n), np.full(n, rate),
+            *gradient, *state,
+        )  # fmt: skip
+    for each in (dust, pressed):
+        drop_module._fill_elastic(setting, each)
+    log = np.zeros((2, len(LOG)))
+    log[:, 2] = setting.impact_speed
+    energies = make_run(setting, log, None, pressed, pressed, dust, wall, 2 * math.pi, 0, 1.0).energies
+    assert energies["gas"] > 0.05 * energies["elastic"] > 0
+    assert abs(energies["plastic"]) < 1e-4 * energies["gas"]
+
+
+def test_energy_of_trapped_gas_is_the_work_of_its_pressure():
+    phi, initial, pressure = np.linspace(0.10, 0.30, 2001), 0.15, 2e4
+    energy = porous_dust.gas_energy(2000 * phi, np.full(phi.size, initial), pressure, 2000.0)
+    excess = pressure * ((1 - initial) / (1 - phi) - 1)
+    np.testing.assert_allclose(
+        np.gradient(energy, phi)[1:-1], (excess / (2000 * phi**2))[1:-1], rtol=1e-3, atol=1e-3
+    )
+    assert energy[500] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_mass_ledger(drop):

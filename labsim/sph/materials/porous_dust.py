@@ -198,3 +198,18 @@ def elastic_energy(
     shape = sxx**2 + szz**2 + (sxx + szz) ** 2 + 2.0 * sxz**2
     volume = k / (monomer_density * zero_stress) * (np.log(ratio) + 1.0 / ratio - 1.0)
     return volume + shape / (4.0 * material.shear_to_bulk * k * density)
+
+
+def gas_energy(
+    density: FloatArray, initial: FloatArray, gas_pressure: float, monomer_density: float
+) -> FloatArray:
+    """Energy held per mass, J/kg, by trapped gas (isothermal) since the pores were as at ``initial`` φ: all of it comes back.
+
+    ∫ P0 ((1 - φi)/(1 - φ) - 1) dφ/(ρs φ²) from φi to φ.
+    """
+    phi = density / monomer_density
+
+    def primitive(at: FloatArray) -> FloatArray:
+        return (1.0 - initial) * (np.log(at / (1.0 - at)) - 1.0 / at) + 1.0 / at
+
+    return gas_pressure / monomer_density * (primitive(phi) - primitive(initial))
