@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from ..inference.convergence import extrapolate, refine
 from ..inference.run_file import write_run_file
 from ..inference.runs import RunStore, require_runs
-from ..sph import DropRun, check_setting
+from ..sph import DropRun, check_setting, extrapolate, refine
 from . import options
 from ._setting import Asked, make_setting
 
@@ -129,7 +128,9 @@ def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:
     stop = f"{run.stopping_time * 1e3:.3f}"
     if len(runs) > 1:
         for key, name in (("penetration_depth_m", "penetration_depth"), ("stopping_time_s", "stopping_time")):
-            value = extrapolate(runs, name)
+            value = extrapolate(
+                [each.setting.spacing for each in runs], [getattr(each, name) for each in runs]
+            )
             summary[key], summary[f"{key}_sigma"] = value.value, value.sigma
         summary["spacing_study"] = [
             {

@@ -1,7 +1,7 @@
 """The bundled SPH solver: a drop setting in, depth against time and the filling factor out. SI throughout."""
 
 from ._jit import solver_hash
-from .convergence import ConvergedRun, simulate_spacings
+from .convergence import ConvergedRun, extrapolate, refine, simulate_spacings
 from .drop import simulate
 from .run import DropRun, Particles
 from .setting import DropSetting, Numerics, check_setting
@@ -13,6 +13,8 @@ __all__ = [
     "Numerics",
     "Particles",
     "check_setting",
+    "extrapolate",
+    "refine",
     "simulate",
     "simulate_spacings",
     "solver_hash",

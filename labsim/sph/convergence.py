@@ -18,7 +18,7 @@ from .drop import simulate
 from .run import DropRun
 from .setting import DropSetting, check_setting
 
-FINER = 1.5  # ratio of one spacing to the next
+RATIO = math.sqrt(2.0)  # of one spacing to the next: a third run costs as much as eight of the first
 COMPACTED = 0.20  # filling factor above which dust counts as compacted
 
 
@@ -49,6 +49,13 @@ class ConvergedRun:
         return self.runs[-1]
 
 
+def refine(setting: DropSetting, count: int) -> list[DropSetting]:
+    """The setting at ``count`` spacings, each √2 finer than the one before: coarsest first, which is ``setting`` itself."""
+    if count < 2:
+        raise SimulationError("simulation", "spacings", f"is {count}; extrapolation needs at least 2")
+    return [setting.replace(spacing=setting.spacing / RATIO**k) for k in range(count)]
+
+
 def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Extrapolated:
     """Value at spacing zero of quantities that are linear in the spacing, with an honest sigma."""
     h, y = np.asarray(spacings, dtype=float), np.asarray(values, dtype=float)
@@ -75,17 +82,11 @@ def _observed_order(h: np.ndarray, y: np.ndarray) -> float | None:
 def simulate_spacings(
     setting: DropSetting, count: int = 3, progress: Callable[[float], None] | None = None
 ) -> ConvergedRun:
-    """Run a drop at ``count`` spacings, the finest being ``setting.spacing`` / 1.5 and every other 1.5 times coarser.
-
-    So with three the working spacing lies in the middle. Raises SimulationError where the coarsest does not resolve the
-    projectile: then state a finer spacing.
-    """
-    if count < 2:
-        raise SimulationError("simulation", "spacings", f"is {count}; extrapolation needs at least 2")
-    spacings = [setting.spacing * FINER ** (count - 2 - k) for k in range(count)]
-    settings = [setting.replace(spacing=spacing) for spacing in spacings]
+    """Run a drop at the ``count`` spacings of ``refine`` and extrapolate. Raises SimulationError where one cannot be run."""
+    settings = refine(setting, count)
     for each in settings:
         check_setting(each)
+    spacings = [each.spacing for each in settings]
     runs = tuple(simulate(each, progress) for each in settings)
     return ConvergedRun(
         runs,

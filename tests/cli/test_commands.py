@@ -18,6 +18,7 @@ import pytest
 
 from labsim.cli import list_command_files, main
 from labsim.inference.run_file import read_run_file
+from labsim.sph import extrapolate
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"
 TRACKS = SEED.parent / "campaigns" / "p01"
@@ -74,6 +75,9 @@ def test_several_spacings_are_extrapolated(tmp_path: Path, capsys: pytest.Captur
     coarse, fine = (each["penetration_depth_m"] for each in summary["spacing_study"])
     ratio = 2**0.5
     assert summary["penetration_depth_m"] == pytest.approx((ratio * fine - coarse) / (ratio - 1))
+    spacings = [each["spacing_m"] for each in summary["spacing_study"]]
+    same = extrapolate(spacings, [coarse, fine])  # the library's sigma, not one of the command's own
+    assert summary["penetration_depth_m_sigma"] == pytest.approx(same.sigma)
     assert "extrapolated from 2 spacings" in out
     assert (tmp_path / "run.mp4").stat().st_size > 20_000
 

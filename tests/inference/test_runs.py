@@ -14,7 +14,6 @@ import pytest
 
 from labsim.errors import InferenceError, SimulationError
 from labsim.inference import run_file
-from labsim.inference.convergence import extrapolate, refine
 from labsim.inference.curves import encode_run
 from labsim.inference.run_file import FailedRun, canonical, make_key, read_run_file, write_run_file
 from labsim.inference.run_parts import Compaction, Motion
@@ -212,17 +211,3 @@ def test_a_dask_scheduler_does_the_same_runs(tmp_path: Path) -> None:
         found = require_runs(store.get_many(settings, scheduler=cluster.scheduler_address))
     here = require_runs(RunStore(tmp_path / "here").get_many(settings, workers=1))
     assert store.new == 2 and all(same(a, b) for a, b in zip(found, here, strict=True))
-
-
-def test_extrapolation_finds_the_value_at_zero_spacing() -> None:
-    class Run:
-        def __init__(self, setting: DropSetting) -> None:
-            self.setting = setting
-            self.penetration_depth = 1e-3 + 0.5 * setting.spacing
-
-    settings = refine(small_drop(), 3)
-    assert settings[0].spacing / settings[2].spacing == pytest.approx(2.0)
-    found = extrapolate([Run(setting) for setting in settings], "penetration_depth")  # type: ignore[misc]
-    assert found.value == pytest.approx(1e-3) and found.sigma == pytest.approx(0.5 * settings[2].spacing)
-    with pytest.raises(InferenceError, match="--spacings"):
-        refine(small_drop(), 1)

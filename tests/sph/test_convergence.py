@@ -8,7 +8,7 @@ import pytest
 from labsim.errors import SimulationError
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
-from labsim.sph.convergence import extrapolate, simulate_spacings
+from labsim.sph.convergence import extrapolate, refine, simulate_spacings
 
 RADIUS = 5e-4
 BEAD = Projectile("hemisphere", RADIUS, 2540 * 4 / 3 * math.pi * RADIUS**3)
@@ -46,12 +46,20 @@ def test_extrapolation_refuses(spacings, values):
         extrapolate(spacings, values)
 
 
+def test_spacings_begin_with_the_stated_one_and_fall_by_root_two():
+    setting = DropSetting(BEAD, 0.66, Material(), spacing=RADIUS / 5)
+    spacings = [each.spacing for each in refine(setting, 3)]
+    assert spacings == pytest.approx([RADIUS / 5, RADIUS / 5 / 2**0.5, RADIUS / 10])
+    with pytest.raises(SimulationError, match="at least 2"):
+        refine(setting, 1)
+
+
 def test_three_spacings_of_a_drop():
     """The limit agrees with an independent material-point solver of the same equations (0.7012 mm, 1.77 ms)."""
-    setting = DropSetting(BEAD, 0.66, Material(), spacing=RADIUS / 6)
+    setting = DropSetting(BEAD, 0.66, Material(), spacing=RADIUS / 5)
     converged = simulate_spacings(setting)
     ratios = np.divide([run.setting.spacing for run in converged.runs], setting.spacing)
-    np.testing.assert_allclose(ratios, [1.5, 1.0, 1 / 1.5])
+    np.testing.assert_allclose(ratios, [1.0, 2**-0.5, 0.5])
     assert converged.finest is converged.runs[-1]
     depth, time, volume = converged.penetration_depth, converged.stopping_time, converged.compacted_volume
     for name, quantity in (("D", depth), ("T_s", time), ("V", volume)):
@@ -67,6 +75,6 @@ def test_three_spacings_of_a_drop():
 
 def test_a_projectile_that_the_coarsest_does_not_resolve():
     with pytest.raises(SimulationError, match="does not resolve"):
-        simulate_spacings(DropSetting(BEAD, 0.66, Material(), spacing=RADIUS / 5))
+        simulate_spacings(DropSetting(BEAD, 0.66, Material(), spacing=RADIUS / 3))
     with pytest.raises(SimulationError, match="at least 2"):
         simulate_spacings(DropSetting(BEAD, 0.66, Material(), spacing=RADIUS / 8), count=1)
