@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .campaign_tables import (
     read_bead,
     read_camera,
@@ -19,8 +21,9 @@ from .campaign_tables import (
     read_published,
     read_sample,
 )
-from .errors import CampaignError
+from .errors import CampaignError, MeasurementError
 from .records import (
+    Camera,
     Campaign,
     Drop,
     GreyCalibration,
@@ -29,7 +32,7 @@ from .records import (
     Scan,
 )
 from .tables import Document, Table
-from .track_check import check_track_file
+from .tracks import read_rows
 
 SLICE_SUFFIXES = {".tif", ".tiff", ".png", ".bmp"}
 
@@ -122,7 +125,7 @@ def read_drop(path: Path | str) -> Drop:
     source = _read_source(document)
     document.close()
     if kind == "track":
-        check_track_file(record.path, camera)  # type: ignore[arg-type]
+        _check_track(record.path, camera)  # type: ignore[arg-type]
     return Drop(
         name=file.parent.name,
         projectile=projectile,
@@ -233,6 +236,21 @@ def _existing(table: Table, folder: Path, *, folder_allowed: bool) -> Path:
     if path.is_dir() and not any(path.iterdir()):
         raise table.wrong("file", f"{path} is an empty folder; put the frames there")
     return path
+
+
+def _check_track(path: Path, camera: Camera) -> None:
+    """See that a track can be read and reaches below the surface, before anything is computed."""
+    try:
+        deepest = float(np.nanmax(read_rows(path, camera).row))
+    except MeasurementError as trouble:
+        raise CampaignError(trouble.where, trouble.key, trouble.message) from None
+    if deepest <= camera.surface_row:
+        raise CampaignError(
+            path,
+            "rows",
+            f"the track never reaches the surface (largest row {deepest:g}, surface_row_px {camera.surface_row:g}); "
+            "rows grow downwards: check surface_row_px",
+        )
 
 
 def _toml_of(path: Path, name: str) -> Path:

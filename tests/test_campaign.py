@@ -123,7 +123,7 @@ MISTAKES = {
     "record gone": (_remove(T), [D, "record.file", "track.csv", "not there"]),
     "record empty": (lambda f: (f / T).write_text(""), [D, "record.file", "is empty"]),
     "track empty": (lambda f: (f / T).write_text("frame,tip_row_px\n"), [T, "empty"]),
-    "track header": (_replace(T, "tip_row_px", "row"), [T, "tip_row_px", "column"]),
+    "track header": (_replace(T, "tip_row_px", "speed"), [T, "tip_row_px", "column", "speed", "--columns"]),
     "track NaN": (_replace(T, "\n3,256", "\n3,nan"), [T, "tip_row_px", "line 5", "nan"]),
     "track text": (_replace(T, "\n3,256", "\n3,abc"), [T, "tip_row_px", "line 5", "abc"]),
     "track unsorted": (_replace(T, "\n3,256", "\n1,256"), [T, "frame", "line 5"]),

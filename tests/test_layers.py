@@ -11,7 +11,7 @@ ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
     {"tables", "tracks"},
-    {"campaign_tables", "track_check"},
+    {"campaign_tables"},
     {"campaign", "video", "ct", "sph"},  # siblings that never import each other
     {"effects"},
     {"inference"},

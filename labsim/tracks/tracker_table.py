@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import MeasurementError
 from ..records import FloatArray
 from . import Points
+from .lines import find_mark, read_lines
 
 NAME = "OSP Tracker tables (t, x, y … with pixely)"
 SUFFIXES = {".txt", ".csv", ".tsv", ".dat"}
@@ -24,12 +25,12 @@ COLUMN = re.compile(r"^(?P<name>[a-z]+)\s*[(\[_]?\s*(?P<unit>m|cm|mm|um|µm|s|ms
 
 
 def recognises(path: Path) -> bool:
-    return path.suffix.lower() in SUFFIXES and _find_header(_read_lines(path, 8)) is not None
+    return path.suffix.lower() in SUFFIXES and _find_header(_texts(path, 8)) is not None
 
 
 def read_points(path: Path) -> dict[str, Points]:
     """Every track of a table by its name. Raises MeasurementError."""
-    lines = _read_lines(path)
+    lines = _texts(path)
     found = _find_header(lines)
     assert found is not None
     at, mark = found
@@ -56,25 +57,19 @@ def read_points(path: Path) -> dict[str, Points]:
                 )
             height = numbers[:, here["y"]] * unit
         frame = numbers[:, here["frame"]] if "frame" in here else None
-        tracks[name] = Points(frame=frame, time=time, row=row, height=height)
+        # t is the time of the video file, for high-speed recordings mostly that of the replay: frames win
+        tracks[name] = Points(frame=frame, time=time if frame is None else None, row=row, height=height)
     return tracks
 
 
-def _read_lines(path: Path, most: int | None = None) -> list[str]:
-    with path.open(encoding="utf-8-sig", errors="replace") as stream:
-        lines = []
-        for line in stream:
-            if line.strip():
-                lines.append(line.rstrip("\n"))
-            if most is not None and len(lines) >= most:
-                break
-    return lines
+def _texts(path: Path, most: int | None = None) -> list[str]:
+    return [text for _, text in read_lines(path, most)]
 
 
 def _find_header(lines: list[str]) -> tuple[int, str] | None:
     """Line of the columns and what separates them: t first, then a y or pixely; None where there is no such line."""
     for at, line in enumerate(lines[:4]):
-        mark = next((m for m in ("\t", ";", ",") if m in line), " ")
+        mark = find_mark(line)
         names = [_read_column(cell)[0] for cell in _split(line, mark)]
         if names and names[0] == "t" and {"y", "pixely"} & set(names):
             return at, mark

@@ -9,7 +9,7 @@ from .frames import Frames, open_frames
 from .local import fit_local_polynomial
 from .overlay import draw_contact_sheet, write_overlay
 from .scale import measure_ruler, scale_from_diameter
-from .track_file import read_track, tabulate_curve, tabulate_track, write_curve, write_track
+from .track_file import make_track, read_track, tabulate_curve, tabulate_track, write_curve, write_track
 from .tracker import Tracking, follow_projectile, track_projectile
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "fit_deceleration",
     "fit_local_polynomial",
     "follow_projectile",
+    "make_track",
     "measure_ruler",
     "open_frames",
     "read_picture",

@@ -8,102 +8,43 @@ import numpy as np
 import pandas as pd
 
 from ..errors import MeasurementError
-from ..records import Camera, DecelerationCurve, FloatArray, Track
-from ..tracks import find_format, read_rows
+from ..records import Camera, DecelerationCurve, Track
+from ..tracks import TrackRows, read_rows
 
 
 def read_track(path: Path | str, camera: Camera, row_sigma: float | None) -> Track:
-    """Read ``frame,tip_row_px`` (and, where present, ``time_s``, ``sigma_px``) into a Track.
+    """Read a track file of any format (labsim/tracks) into a Track.
 
-    Missing frames stay missing: time = frame / frame rate unless the file brings its own ``time_s``. An empty
-    tip_row_px is a frame without a position (valid = False). Outliers are kept; ``fit_deceleration`` finds them.
-    ``row_sigma`` (px) holds for every frame that the file gives no ``sigma_px`` for; where there is neither, the
-    scatter about the local motion is measured and used. Files of other programs (labsim/tracks) are read alike.
+    Missing frames stay missing, and a frame without a position is not valid. Time = frame / frame rate unless the file brings
+    its camera's own ``time_s``. Outliers are kept; ``fit_deceleration`` finds them. ``row_sigma`` (px) holds for every frame
+    that the file gives no ``sigma_px`` for; where there is neither, the scatter about the local motion is measured and used.
     Raises MeasurementError.
     """
-    path = Path(path)
-    if find_format(path) is not None:
-        return _make_track(path, camera, row_sigma)
-    try:
-        table = pd.read_csv(path, comment="#", skipinitialspace=True, encoding_errors="replace")
-    except FileNotFoundError:
-        raise MeasurementError(path, "track", "does not exist; name a CSV file frame,tip_row_px") from None
-    except (
-        pd.errors.ParserError,
-        pd.errors.EmptyDataError,
-        UnicodeDecodeError,
-        OSError,
-        ValueError,
-    ) as trouble:
-        raise MeasurementError(path, "track", f"is no table ({trouble}); write frame,tip_row_px") from None
-    table.columns = [str(name).strip() for name in table.columns]
-    for name in ("frame", "tip_row_px"):
-        if name not in table.columns:
-            raise MeasurementError(
-                path, name, f"no such column among {list(table.columns)}; write frame,tip_row_px"
-            )
-    numbers = {}
-    for name in ("frame", "tip_row_px", "time_s", "sigma_px"):
-        if name in table.columns:
-            column = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
-            blank = table[name].isna().to_numpy()
-            wrong = np.flatnonzero(~np.isfinite(column) & ~blank)
-            if wrong.size:
-                value = table[name].iloc[wrong[0]]
-                raise MeasurementError(
-                    path, name, f"line {wrong[0] + 2} holds {value!r}; write a number or nothing"
-                )
-            numbers[name] = column
-    frame = numbers["frame"]
-    if len(frame) == 0:
-        raise MeasurementError(path, "tip_row_px", "holds no frame; a track needs at least 8")
-    if not np.all(np.isfinite(frame)) or np.any(frame != np.round(frame)):
-        raise MeasurementError(path, "frame", "is not a whole number in every line; count frames 0, 1, 2 …")
-    if np.any(np.diff(frame) <= 0):
-        line = int(np.flatnonzero(np.diff(frame) <= 0)[0]) + 3
-        raise MeasurementError(path, "frame", f"does not grow in line {line}; sort the frames, each once")
-    row = numbers["tip_row_px"]
-    time = numbers.get("time_s", frame / camera.frame_rate)
-    time = np.where(np.isfinite(time), time, frame / camera.frame_rate)
-    return _finish(path, frame, time, row, numbers.get("sigma_px"), row_sigma)
+    return make_track(path, read_rows(path, camera), row_sigma)
 
 
-def _make_track(path: Path, camera: Camera, row_sigma: float | None) -> Track:
-    """A Track from another program's file."""
-    rows = read_rows(path, camera)
-    sigma = rows.sigma if np.any(np.isfinite(rows.sigma)) else None
-    return _finish(path, rows.frame, rows.frame / camera.frame_rate, rows.row, sigma, row_sigma)
-
-
-def _finish(
-    path: Path,
-    frame: np.ndarray,
-    time: FloatArray,
-    row: FloatArray,
-    own_sigma: FloatArray | None,
-    row_sigma: float | None,
-) -> Track:
-    """Error bars and gaps, the same for every format."""
+def make_track(path: Path | str, rows: TrackRows, row_sigma: float | None) -> Track:
+    """Rows of a file as a Track: error bars and gaps. ``row_sigma`` as for ``read_track``. Raises MeasurementError."""
+    frame, row = rows.frame, rows.row
     valid = np.isfinite(row)
-    warnings = []
+    warnings = list(rows.warnings)
     missing = int(frame[-1] - frame[0] + 1 - len(frame)) + int(np.sum(~valid))
     if missing:
         warnings.append("1 frame has no position" if missing == 1 else f"{missing} frames have no position")
-    if row_sigma is None:
-        row_sigma = measure_scatter(time[valid], row[valid])
+    stated = np.isfinite(rows.sigma) & (rows.sigma > 0)
+    if row_sigma is None and not np.all(stated[valid]):
+        row_sigma = measure_scatter(rows.time[valid], row[valid])
         if not np.isfinite(row_sigma):
             raise MeasurementError(
                 path, "tip_row_px", "too few frames to measure their scatter; give row_sigma_px"
             )
-        if own_sigma is None:
+        if not stated.any():
             warnings.append(f"no error bar given; scatter about the local motion is {row_sigma:.3f} px")
-    sigma = own_sigma if own_sigma is not None else np.full(len(row), np.nan)
-    sigma = np.where(np.isfinite(sigma) & (sigma > 0), sigma, row_sigma)
     return Track(
-        frame=frame.astype(np.int64),
-        time=time,
+        frame=frame,
+        time=rows.time,
         tip_row=row,
-        sigma=sigma,
+        sigma=np.where(stated, rows.sigma, np.nan if row_sigma is None else row_sigma),
         valid=valid,
         reason=tuple("" if ok else "no position in the file" for ok in valid),
         warnings=tuple(warnings),
@@ -163,13 +104,11 @@ def deviate_from_neighbours(time: np.ndarray, row: np.ndarray) -> tuple[np.ndarr
     n = len(row)
     if n < 8:
         return np.empty(0), np.empty(0)
-    deviation, factor = np.empty(n), np.empty(n)
-    for i in range(n):
-        start = min(max(i - 2, 0), n - 5)
-        near = np.array([k for k in range(start, start + 5) if k != i])
-        x = time[near] - time[i]
-        scale = np.max(np.abs(x))
-        weights = np.linalg.pinv(np.vander(x / scale, 3, increasing=True))[0]
-        deviation[i] = row[i] - weights @ row[near]
-        factor[i] = np.sqrt(1.0 + weights @ weights)
-    return deviation, factor
+    here = np.arange(n)
+    window = np.clip(here - 2, 0, n - 5)[:, None] + np.arange(5)
+    near = window[window != here[:, None]].reshape(n, 4)
+    x = time[near] - time[:, None]
+    x /= np.abs(x).max(axis=1, keepdims=True)
+    weights = np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=2))[:, 0]  # (n, 4)
+    deviation = row - np.einsum("nk,nk->n", weights, row[near])
+    return deviation, np.sqrt(1.0 + np.sum(weights**2, axis=1))

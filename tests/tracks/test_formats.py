@@ -16,7 +16,6 @@ from labsim.errors import CampaignError, LabsimError, MeasurementError
 from labsim.inference.observe import observe_drops
 from labsim.records import Camera
 from labsim.tracks import find_format, list_formats, read_rows
-from labsim.tracks.trackpy_table import split_particles
 from labsim.video import read_track
 
 DATA = Path(__file__).parents[2] / "data"
@@ -208,7 +207,7 @@ WRONG = {
     "text in y": ("t.txt", HEAD + "0.0\t1\t2\tabc\n", ["pixely", "line 2", "abc"]),
     "played at 30 Hz": ("t.txt", HEAD + "".join(f"{i / 30:.7f}\t1\t2\t{i}\n" for i in range(9)), ["t: ", "10000 Hz", "frame"]),
     "recorded faster": ("t.txt", HEAD + "".join(f"{i / 4e5:.7f}\t1\t2\t{i}\n" for i in range(9)), ["t: ", "10000 Hz"]),
-    "two particles": ("t.csv", "frame,x,y,particle\n0,1,2,0\n0,1,2,1\n", ["2 tracks (0, 1)", "keep one"]),
+    "two particles": ("t.csv", "frame,x,y,particle\n0,1,2,0\n0,1,2,1\n", ["2 tracks (0, 1)", "choose one with --particle 0"]),
     "frame twice": ("t.csv", "frame,x,y\n0,1,2\n0,1,3\n", ["frame", "0 has two positions"]),
     "half a frame": ("t.csv", "frame,x,y\n0.5,1,2\n", ["frame", "0.5", "whole number"]),
     "text in a table": ("t.csv", "frame,x,y\n0,1,two\n", ["y", "line 2", "two"]),
@@ -255,13 +254,12 @@ def test_damaged_projects_never_end_in_a_traceback(tmp_path: Path, rows: dict[in
 
 def test_every_format_is_listed_and_says_what_it_is() -> None:
     formats = list_formats()
-    assert {"tracker_project", "tracker_table", "trackpy_table"} <= set(formats)
     for module in formats.values():
         assert module.NAME and callable(module.recognises) and callable(module.read_points)
 
 
-def test_labsims_own_tracks_are_left_alone() -> None:
-    assert find_format(DATA / "campaigns/p01/drops/D05/track.csv") is None
+def test_labsims_own_tracks_are_tables() -> None:
+    assert find_format(DATA / "campaigns/p01/drops/D05/track.csv") is list_formats()["table"]
 
 
 @pytest.mark.filterwarnings("ignore:The inplace keyword")  # trackpy 0.7 on pandas 3
@@ -274,8 +272,10 @@ def test_a_linked_data_frame_of_trackpy(tmp_path: Path) -> None:
         pictures.append((20 + 200 * np.exp(-((y - 12 - 4.3 * i) ** 2 + (x - 20) ** 2) / 8)).astype(np.uint8))
     trackpy.quiet()
     linked = trackpy.link(trackpy.batch(pictures, 9, processes=1), 8)
-    points = split_particles(linked)
-    assert list(points) == ["0"]
-    assert np.allclose(points["0"].row, 12 + 4.3 * np.arange(12), atol=0.15)
+    assert set(linked["particle"]) == {0}
     linked.to_csv(tmp_path / "linked.csv")
-    assert np.allclose(read_rows(tmp_path / "linked.csv", CAMERA).row, points["0"].row)
+    rows = read_rows(tmp_path / "linked.csv", CAMERA)
+    assert rows.name == "0"
+    assert np.array_equal(rows.row, linked["y"]) and np.allclose(
+        rows.row, 12 + 4.3 * np.arange(12), atol=0.15
+    )

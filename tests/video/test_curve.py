@@ -171,8 +171,8 @@ def test_local_polynomial_agrees_inside() -> None:
     ("text", "key"),
     [
         ("", "track"),
-        ("frame,row\n1,2\n", "tip_row_px"),
-        ("frame,tip_row_px\n", "tip_row_px"),
+        ("frame,speed\n1,2\n", "tip_row_px"),
+        ("frame,tip_row_px\n", "the track is empty"),
         ("frame,tip_row_px\n0,1\n0,2\n", "frame"),
         ("frame,tip_row_px\n0,1\n1,abc\n", "tip_row_px"),
         ("frame,tip_row_px\n0.5,1\n1,2\n", "frame"),
