@@ -11,6 +11,9 @@ from .errors import CampaignError
 from .records import Measured
 
 _REQUIRED: Any = object()
+EXPLAINED = "labsim new DIR writes a campaign with every table and key explained"
+# bytes of a TOML file; a written campaign.toml has some 2 kB, and tomllib takes minutes for millions of keys
+LARGEST = 1_000_000
 
 
 class Table:
@@ -34,8 +37,16 @@ class Table:
         if key in self.values:
             return self.values[key]
         if default is _REQUIRED:
-            raise self.wrong(key, "is missing; add it (see docs/campaign-format.md)")
+            raise self.wrong(key, "is missing; " + self._find_instead(key))
         return default
+
+    def _find_instead(self, key: str) -> str:
+        """The key that may have been meant by it, where there is one that nobody has asked for; otherwise where to look it up."""
+        others = {other for other in self.values if other not in self.known and not _are_siblings(key, other)}
+        near = _nearest(key, others)
+        if near is None:
+            return f"add it ({EXPLAINED})"
+        return f"{near} is not a key of the campaign format: did you mean {key}?"
 
     def number(
         self,
@@ -134,10 +145,21 @@ class Document:
     def __init__(self, file: Path) -> None:
         self.file = file
         try:
+            if file.exists() and not file.is_file():
+                raise CampaignError(file, "", "is no plain file; write it as TOML text")
             with file.open("rb") as stream:
-                self.values = tomllib.load(stream)
+                content = stream.read(LARGEST + 1)
+            if len(content) > LARGEST:
+                raise CampaignError(
+                    file, "", f"has more than {LARGEST} bytes; such a file has a few thousand"
+                )
+            self.values = tomllib.loads(content.decode("utf-8"))
         except FileNotFoundError:
-            raise CampaignError(file, "", "no such file; write it (see docs/campaign-format.md)") from None
+            raise CampaignError(file, "", f"no such file; write it ({EXPLAINED})") from None
+        except RecursionError:
+            raise CampaignError(
+                file, "", "nests tables or lists too deeply; write each on a line of its own"
+            ) from None
         except tomllib.TOMLDecodeError as trouble:
             raise CampaignError(file, "", f"is not TOML: {trouble}; correct that line") from None
         except UnicodeDecodeError:
@@ -165,9 +187,10 @@ class Document:
                 self.file, name, f"{values!r} is not a table; write [{name}] on a line of its own"
             )
         if required and name not in self.values:
-            raise CampaignError(
-                self.file, f"[{name}]", "is missing; add this table (see docs/campaign-format.md)"
-            )
+            others = {other for other, value in self.values.items() if isinstance(value, dict)} - self.asked
+            near = _nearest(name, others)
+            remedy = f"did you mean it by [{near}]?" if near else f"add this table ({EXPLAINED})"
+            raise CampaignError(self.file, f"[{name}]", f"is missing; {remedy}")
         table = Table(self.file, name, values)
         self.tables.append(table)
         return table
@@ -184,6 +207,14 @@ class Document:
                 )
         for table in self.tables:
             table.close()
+
+
+def _are_siblings(key: str, other: str) -> bool:
+    """phi_1 and phi_2, height_mm and height_sigma_mm: keys that resemble each other and are both of the format."""
+    words, others = key.lower().split("_"), other.lower().split("_")
+    if ("sigma" in words) != ("sigma" in others):
+        return True
+    return words[:-1] == others[:-1] and len(words[-1]) == len(others[-1]) == 1
 
 
 def _nearest(word: str, known: set[str]) -> str | None:
