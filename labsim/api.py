@@ -7,12 +7,12 @@ say ``workers=1``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import CampaignError, MeasurementError
-from .records import Camera, Campaign, CompressedVolume, DecelerationCurve, Drop, FloatArray, Scan, Track
+from .errors import CampaignError
+from .records import Campaign, CompressedVolume, DecelerationCurve, Drop, FloatArray, Measured, Scan, Track
 
 if TYPE_CHECKING:  # pragma: no cover
     import pandas as pd
@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # pragma: no cover
     from .inference.runs import RunStore
     from .inference.summary import SummaryCalibration
     from .sph import DropRun, DropSetting
+    from .video.following import Progress
 
 
 def track(
@@ -31,55 +32,54 @@ def track(
     *,
     frame_rate: float | None = None,
     pixel_size: float | None = None,
+    pixel_size_sigma: float = 0.0,
+    rod_diameter: float | None = None,
+    rod_diameter_sigma: float = 0.0,
+    ruler: Path | str | None = None,
+    ruler_step: float = 1e-3,
     surface_row: float | None = None,
     surface_row_sigma: float = 0.15,
     row_sigma: float | None = None,
-) -> tuple[Track, DecelerationCurve]:
+    rotate: int = 0,
+    frames: tuple[int, int] | None = None,
+    columns: Mapping[str, str] | None = None,
+    particle: str | None = None,
+    progress: Progress | None = None,
+) -> tuple[Track, DecelerationCurve | None]:
     """Follow a projectile, or read a finished track, and fit its motion.
 
     source : a drop of a campaign, its folder, a video, a folder of pictures, or a track file of any format labsim reads.
-    frame_rate : Hz. pixel_size : m. surface_row, surface_row_sigma, row_sigma : px, rows grow downwards. What is left out comes
-    from the drop, or for a video from its own pictures (surface). Returns the track (rows, px) and the deceleration curve (SI,
-    time zero at contact). Raises MeasurementError where something is not known or nothing can be tracked.
-    """
-    from . import video
-    from .campaign import read_drop
-    from .tracks import find_format
+    frame_rate : Hz. pixel_size and its sigma : m. rod_diameter and its sigma : m, of a rod or bead that gives the scale.
+    ruler : picture of one, with ticks every ruler_step (m). surface_row, surface_row_sigma, row_sigma : px, rows grow downwards.
+    rotate : degrees, anticlockwise. frames : first and last picture to use. columns : what a table's columns are, as
+    {"time_ms": "t", "depth_mm": "z"}. particle : which of several tracks. What is left out comes from the drop, or for a video
+    from its own pictures (surface).
 
-    if not isinstance(source, Drop) and (Path(source) / "drop.toml").is_file():
-        source = read_drop(source)
-    if isinstance(source, Drop):
-        if source.camera is None or source.record.path is None:
-            raise MeasurementError(
-                source.name, "record.kind", "is summary: published figures hold nothing to track"
-            )
-        frame_rate = frame_rate or source.camera.frame_rate
-        pixel_size = pixel_size or source.camera.pixel_size
-        row_sigma = row_sigma or source.record.row_sigma
-        if surface_row is None:
-            surface_row, surface_row_sigma = source.camera.surface_row, source.camera.surface_row_sigma
-        path = source.record.path
-    else:
-        path = Path(source)
-    if pixel_size is None:
-        raise MeasurementError(path, "pixel_size", "is not known; give it in m")
-    if path.is_file() and (path.suffix.lower() in {".csv", ".txt"} or find_format(path) is not None):
-        if frame_rate is None or surface_row is None:
-            raise MeasurementError(path, "frame_rate, surface_row", "are not in a table; give both")
-        camera = Camera(frame_rate, pixel_size, surface_row, surface_row_sigma)
-        found = video.read_track(path, camera, row_sigma)
-    else:
-        seen = video.follow_projectile(
-            video.open_frames(path), frame_rate=frame_rate, surface_row=surface_row
-        )
-        found = seen.track
-        if surface_row is None:
-            if seen.surface is None:
-                raise MeasurementError(path, "surface_row", "is not seen in the pictures; give it in px")
-            surface_row, surface_row_sigma = seen.surface.value, seen.surface.sigma
-        rate = frame_rate or (len(found.time) - 1) / float(found.time[-1] - found.time[0])
-        camera = Camera(rate, pixel_size, surface_row, surface_row_sigma)
-    return found, video.fit_deceleration(found, camera, name=path)
+    Returns the track (rows, px) and the deceleration curve (SI, time zero at contact); of a video without scale, surface or
+    contact the track and None, with the reason among its warnings. Raises MeasurementError where something is not known or
+    nothing can be tracked.
+    """
+    from .tracking import measure, read_request
+
+    tracked = measure(
+        read_request(
+            source,
+            frame_rate=frame_rate,
+            pixel_size=None if pixel_size is None else Measured(pixel_size, pixel_size_sigma),
+            rod_diameter=None if rod_diameter is None else Measured(rod_diameter, rod_diameter_sigma),
+            ruler=None if ruler is None else Path(ruler),
+            ruler_step=ruler_step,
+            surface_row=surface_row,
+            surface_row_sigma=surface_row_sigma,
+            row_sigma=row_sigma,
+            rotate=rotate,
+            frames=frames,
+            columns=columns,
+            particle=particle,
+        ),
+        progress,
+    )
+    return tracked.track, tracked.curve
 
 
 def reduce_scan(source: Path | str | Scan, **settings: Any) -> ReducedScan:

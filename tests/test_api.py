@@ -58,7 +58,7 @@ def test_a_file_needs_its_scales() -> None:
     path = DATA / "campaigns/p01/drops/D05/track.csv"
     with pytest.raises(MeasurementError, match="pixel_size"):
         labsim.track(path)
-    with pytest.raises(MeasurementError, match="frame_rate, surface_row"):
+    with pytest.raises(MeasurementError, match="frame_rate, surface_row: are not"):
         labsim.track(path, pixel_size=2e-5)
     with pytest.raises(MeasurementError, match="summary"):
         labsim.track(DATA / "guettler2009/drops/D01")
@@ -69,6 +69,25 @@ def test_a_video_without_a_surface_row(tmp_path: Path) -> None:
         DATA / "video/rendered_drops/mjpeg/video.avi", frame_rate=10000.0, pixel_size=20e-6
     )
     assert len(track.frame) > 50 and curve.penetration_depth.value > 2e-4
+
+
+def test_python_and_the_command_line_keep_the_same_tracks() -> None:
+    """A fall without a scale or a contact is a track without a curve, and says why; options are those of the command."""
+    video = DATA / "video/ball_drop_120fps/ball_drop.mp4"
+    track, curve = labsim.track(
+        video, frame_rate=120.0, frames=(118, 201), rod_diameter=0.04, surface_row=1700.0
+    )
+    assert curve is None and len(track.frame) == 84 and track.valid.sum() >= 60
+    assert any(text.startswith("no curve") and "never reaches the surface" in text for text in track.warnings)
+
+
+def test_a_table_of_lengths_in_python(tmp_path: Path) -> None:
+    fall = [-1.0 + 0.065 * i if i < 15 else 0.0 for i in range(60)]
+    (tmp_path / "t.csv").write_text("a;b\n" + "".join(f"{i / 10};{depth}\n" for i, depth in enumerate(fall)))
+    with pytest.raises(MeasurementError, match="no such column among a, b"):
+        labsim.track(tmp_path / "t.csv")
+    with pytest.raises(MeasurementError, match="never reaches the surface"):
+        labsim.track(tmp_path / "t.csv", columns={"time_ms": "a", "depth_mm": "b"}, row_sigma=0.5)
 
 
 def test_a_map_as_netcdf(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ FLOORS = [
     {"tables", "tracks"},
     {"campaign_tables"},
     {"campaign", "video", "ct", "sph"},  # siblings that never import each other
-    {"effects"},
+    {"effects", "tracking"},
     {"inference"},
     {"diagnosis"},
     {"report"},

@@ -17,6 +17,7 @@ import pkgutil
 import sys
 import textwrap
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -67,6 +68,12 @@ class CommandFolder(typer.core.TyperGroup):
     def list_commands(self, ctx: object) -> list[str]:
         return [name.rstrip("_").replace("_", "-") for name in list_command_files()]
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name = args[0]
+        if self.get_command(ctx, name) is None and (near := get_close_matches(name, self.list_commands(ctx))):
+            ctx.fail(f"No such command {name!r} (did you mean {' or '.join(near[:2])}?)")
+        return super().resolve_command(ctx, args)
+
     def get_command(self, ctx: object, cmd_name: str):  # type: ignore[no-untyped-def]
         module_name = cmd_name.replace("-", "_")
         if keyword.iskeyword(module_name):
@@ -115,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         status = app(args=given, prog_name="labsim", standalone_mode=False)
     except LabsimError as trouble:
+        options.drop_empty_folder()
         status = _complain(str(trouble), 2)
     except BrokenPipeError:  # head, or a pager that was left
         sys.stdout = None  # type: ignore[assignment]

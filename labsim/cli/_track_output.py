@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +10,17 @@ import numpy as np
 import pandas as pd
 
 from .. import video
+from ..errors import LabsimError
 from ..records import DecelerationCurve, Measured, Track
-from ._track_request import Request, make_camera
+from ..tracking import Request, Tracked, make_camera
 
 
-def write_files(
-    folder: Path,
-    request: Request,
-    found: Track,
-    curve: DecelerationCurve | None,
-    frames: video.Frames | None,
-    seen: video.Tracking | None,
-) -> list[str]:
+def write_files(folder: Path, tracked: Tracked) -> list[str]:
     """Tables and pictures; their names."""
     from ..report import track_figures
+
+    request, found, curve, seen = tracked.request, tracked.track, tracked.curve, tracked.seen
+    frames = request.frames
 
     video.write_track(found, folder / "track.csv")
     written = ["track.csv"]
@@ -65,10 +63,28 @@ def _choose_moments(found: Track, curve: DecelerationCurve | None) -> list[int]:
     )
 
 
-def summarise(
-    request: Request, found: Track, curve: DecelerationCurve | None, seen: video.Tracking | None
-) -> dict[str, Any]:
+def draw_failure(request: Request, folder: Path, trouble: LabsimError) -> Path | None:
+    """What was seen of a record that could not be measured, with the reason; None where nothing can be shown."""
+    from ..report import track_figures
+
+    path = folder / "seen.png"
+    with suppress(LabsimError):
+        if request.frames is not None:
+            pictures, captions = video.draw_scene(request.frames)
+            return track_figures.draw_frames(pictures, captions, path, trouble.message)
+        assert request.points is not None
+        _name, points = request.points
+        rows = points.row is not None
+        position = points.row if rows else points.height
+        columns = ("time (s)", points.time) if points.time is not None else ("frame", points.frame)
+        surface = request.surface.value if request.surface and rows else 0.0
+        return track_figures.draw_table(columns, position, surface, path, trouble.message, rows=rows)  # type: ignore[arg-type]
+    return None
+
+
+def summarise(tracked: Tracked) -> dict[str, Any]:
     """What drop.json holds."""
+    request, found, curve, seen = tracked.request, tracked.track, tracked.curve, tracked.seen
     summary: dict[str, Any] = {}
     figures: dict[str, Any] = {
         "contact_time_s": curve and curve.contact_time,
@@ -103,8 +119,7 @@ def summarise(
     summary["frames_rejected"] = int(np.sum(~found.valid)) + (
         int(np.sum(np.isfinite(curve.residual) & ~curve.used)) if curve is not None else 0  # type: ignore[arg-type, operator]
     )
-    warnings = [*(curve.warnings if curve is not None else found.warnings), *request.warnings]
-    summary["warnings"] = list(dict.fromkeys(warnings))
+    summary["warnings"] = list(curve.warnings if curve is not None else found.warnings)
     return summary
 
 

@@ -9,7 +9,7 @@ import re
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
@@ -19,7 +19,8 @@ from ..errors import LabsimError
 from . import _provenance
 
 Out = Annotated[
-    Path | None, typer.Option("--out", "-o", help="Output folder. Default: a new folder beside the input.")
+    Path | None,
+    typer.Option("--out", "-o", help="Output folder. Default: a new one here, named after the input."),
 ]
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes that run simulations. Default: all cores.")
@@ -37,34 +38,63 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON 
 def make_output_folder(out: Path | None, source: Path, command: str) -> Path:
     """Make the folder to write into and return it.
 
-    Without --out it is a new ``NAME-COMMAND`` beside the input (with a number where that is taken). Never inside a
-    campaign: what is written there would be read as data one day. Raises LabsimError.
+    Without --out it is a new ``NAME-COMMAND`` in the current directory (with a number where that is taken), named after the
+    input: a file's stem, a folder's name, CAMPAIGN-D01 for a part of a campaign. Never inside a campaign, where it would be
+    read as data one day, nor inside a folder that is the input: who stands there gets it beside that folder. Raises LabsimError.
     """
     source = source.resolve()
-    if source.is_file():
-        source = source.parent
-    campaign = next((p for p in (source, *source.parents) if (p / "campaign.toml").is_file()), source)
     if out is None:
-        beside = campaign.with_name(f"{campaign.name}-{command}")
-        if source != campaign:
-            beside = campaign.with_name(f"{campaign.name}-{source.name}-{command}")
-        out, number = beside, 1
-        while out.exists() and any(out.iterdir()):
+        wanted = _leave_input(Path.cwd().resolve(), source) / f"{_name_input(source)}-{command}"
+        out, number = wanted, 1
+        while out.exists() and not (out.is_dir() and not any(out.iterdir())):
             number += 1
-            out = beside.with_name(f"{beside.name}-{number}")
+            out = wanted.with_name(f"{wanted.name}-{number}")
     out = out.resolve()
-    if out == source or source in out.parents or out == campaign or campaign in out.parents:
-        raise LabsimError(out, "--out", f"lies inside the input {campaign}; name a folder outside it")
+    if (outside := _leave_input(out, source)) != out:
+        raise LabsimError(
+            out, "--out", f"lies inside the input; name a folder outside it, as {outside / out.name}"
+        )
+    new = not out.exists()
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as trouble:
         raise LabsimError(
             out, "--out", f"cannot be made ({trouble.strerror}); name a folder you may write to"
         ) from None
-    _output[:] = [out]
+    _output[:], _made[:] = [out], [out] if new else []
     return out
 
 
+def _find_campaign(path: Path) -> Path | None:
+    """The campaign folder that a path is or lies in."""
+    return next((each for each in (path, *path.parents) if (each / "campaign.toml").is_file()), None)
+
+
+def _leave_input(place: Path, source: Path) -> Path:
+    """``place``, or the first folder above it that lies in no campaign and not in a folder that is the input."""
+    if campaign := _find_campaign(place):
+        place = campaign.parent
+    if source.is_dir() and source in (place, *place.parents):
+        place = source.parent
+    return place
+
+
+def _name_input(source: Path) -> str:
+    campaign = _find_campaign(source)
+    if source.is_file() and campaign is None and source.suffix != ".toml":
+        return source.stem
+    folder = source.parent if source.is_file() else source
+    return folder.name if campaign in (None, folder) else f"{campaign.name}-{folder.name}"
+
+
+def drop_empty_folder() -> None:
+    """Remove the output folder that this command made and left empty."""
+    for folder in _made:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+_made: list[Path] = []
 _output: list[Path] = []
 
 
@@ -153,6 +183,7 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=24),
             TaskProgressColumn(),
+            TextColumn("elapsed"),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
@@ -177,22 +208,22 @@ class _LineReport:
     EVERY = 30.0  # s
 
     def __init__(self) -> None:
-        self.text, self.began, self.last = "", 0.0, 0.0
+        self.text, self.began, self.last, self.first = "", 0.0, 0.0, 0.0
         self.stage = _Stage("")
 
     def __call__(self, done: float, total: float, text: str) -> None:
         now = time.monotonic()
         if text != self.text:
-            self.text, self.began, self.last = text, now, -math.inf
+            self.text, self.began, self.last, self.first = text, now, -math.inf, done
             self.stage = _Stage(text)
         said = self.stage.tell(done, total)
         ends = done >= total and not self.stage.done
         if self.stage.done or (now - self.last < self.EVERY and not ends):
             return
         self.last, self.stage.done = now, ends
-        left = (
-            f", about {say_time((now - self.began) * (total - done) / done)} left" if 0 < done < total else ""
-        )
+        left, since = "", done - self.first  # what was done before the first call took an unknown time
+        if since > 0 and done < total:
+            left = f", about {say_time((now - self.began) * (total - done) / since)} left"
         share = f": {done / total:.0%}" if total > 0 else ""
         typer.echo(f"{said}{share}{left}", err=True)
 

@@ -7,23 +7,26 @@ from typing import Annotated, Any
 
 import typer
 
-from .. import video
 from ..campaign import read_campaign
 from ..errors import LabsimError, MeasurementError
-from ..records import Camera, DecelerationCurve, Measured, Track
+from ..records import Measured
+from ..tracking import Request, measure, read_request
+from ..tracks.table import read_mapping
 from . import options
 from ._many import Item, finish_many, measure_many
-from ._track_output import summarise, tell, tell_shortly, write_files
-from ._track_request import (
-    Request,
-    is_track_file,
-    make_camera,
-    need,
-    read_range,
-    read_request,
-    take_from_video,
-    take_ruler,
-)
+from ._track_output import draw_failure, summarise, tell, tell_shortly, write_files
+
+# what ``labsim.track`` calls it -> what the command line does
+OPTIONS = {
+    "frame_rate": "--fps",
+    "pixel_size": "--pixel-um",
+    "surface_row": "--surface-row",
+    "row_sigma": "--row-sigma",
+    "rod_diameter": "--rod-diameter-mm",
+    "ruler_step": "--ruler-step-mm",
+    "columns": "--columns",
+    "particle": "--particle",
+}
 
 
 def track(
@@ -64,6 +67,16 @@ def track(
         float | None,
         typer.Option("--row-sigma", help="Uncertainty of a row of a track.csv (px). Default: measured."),
     ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns", help="What a table's columns are: frame=Frame,row=Y or time_ms=t,depth_mm=z."
+        ),
+    ] = None,
+    particle: Annotated[
+        str | None,
+        typer.Option("--particle", help="Name of the track, where a table or project holds several."),
+    ] = None,
     rotate: Annotated[
         int, typer.Option("--rotate", help="Turn the picture anticlockwise: 90, 180, 270.")
     ] = 0,
@@ -87,12 +100,15 @@ def track(
         "surface_row": surface_row,
         "surface_row_sigma": surface_row_sigma,
         "row_sigma": row_sigma,
+        "columns": columns,
+        "particle": particle,
         "rotate": rotate,
         "part": part,
     }
     if (drop / "campaign.toml").is_file():
-        if ruler is not None:
-            raise LabsimError("command line", "--ruler", "belongs to one drop; name its folder")
+        for name, value in (("--ruler", ruler), ("--columns", columns), ("--particle", particle)):
+            if value is not None:
+                raise LabsimError("command line", name, "belongs to one drop; name its folder or file")
         items = [
             Item(each.name, drop / "drops" / each.name, given)
             for each in read_campaign(drop).drops
@@ -107,10 +123,10 @@ def track(
             )
         finish_many(found, folder / "tracks.json", tell_shortly, as_json=as_json, quiet=quiet)
         return
-    read_request(drop, given)  # before a folder is made
+    request = ask(drop, given)  # before a folder is made
     folder = options.make_output_folder(out, drop, "track")
     with options.show_progress(quiet) as progress:
-        summary, lines = track_one(drop, folder, given, progress)
+        summary, lines = _track(request, folder, progress)
     options.finish(summary, lines, as_json=as_json, quiet=quiet)
 
 
@@ -118,69 +134,57 @@ def track_one(
     source: Path, folder: Path, given: dict[str, Any], progress: options.Progress | None = None
 ) -> tuple[dict[str, Any], str]:
     """Files of one drop; its summary and the lines for people."""
-    request, diameter = read_request(source, given), _read_diameter(given)
-    if given["ruler"] is not None:
-        take_ruler(request, given["ruler"], 1e-3 * given["ruler_step_mm"])
-    seen: video.Tracking | None = None
-    frames: video.Frames | None = None
-    if is_track_file(request.source):
-        rate = need(request.fps, request.source, "--fps", "give the frame rate with --fps")
-        row = request.surface.value if request.surface else float("nan")
-        pixel = request.pixel_size.value if request.pixel_size else float("nan")
-        found = video.read_track(request.source, Camera(rate, pixel, row, 0.0), request.row_sigma)
-    else:
-        frames = video.open_frames(request.source).turned(given["rotate"])
-        if given["part"] is not None:
-            frames = frames.section(*read_range(given["part"]))
-        seen = video.follow_projectile(
-            frames,
-            frame_rate=request.fps,
-            surface_row=request.surface.value if request.surface else None,
-            progress=progress,
-        )
-        found = seen.track
-        take_from_video(request, seen, diameter)
-    curve = _fit(request, found, followed=seen is not None)
-    written = write_files(folder, request, found, curve, frames, seen)
-    summary = summarise(request, found, curve, seen)
-    options.write_json(folder / "drop.json", summary)
-    return summary, tell(summary, curve, folder, [*written, "drop.json"])
+    return _track(ask(source, given), folder, progress)
 
 
-def _read_diameter(given: dict[str, Any]) -> Measured | None:
-    diameter, sigma = given["rod_diameter_mm"], given["rod_diameter_sigma_mm"]
-    if diameter is None:
-        return None
-    if not diameter > 0:
-        raise LabsimError("command line", "--rod-diameter-mm", f"{diameter} is not a positive number")
-    return Measured(1e-3 * diameter, 1e-3 * sigma)
-
-
-def _fit(request: Request, found: Track, *, followed: bool) -> DecelerationCurve | None:
-    """The curve, or None with the reason among the warnings: scale or surface not known, or no contact to fit.
-
-    A video that was ``followed`` has given a track, which is worth keeping without a curve; a table has not.
-    """
-    missing = [
-        text
-        for value, text in (
-            (request.pixel_size, "pixel size (--pixel-um, --rod-diameter-mm or --ruler)"),
-            (request.surface, "surface row (--surface-row)"),
-        )
-        if value is None
-    ]
-    if missing:
-        request.warnings.append("no curve: " + " and ".join(missing) + " not known")
-        return None
+def _track(request: Request, folder: Path, progress: options.Progress | None) -> tuple[dict[str, Any], str]:
     try:
-        curve = video.fit_deceleration(found, make_camera(request, found), name=request.source)
+        found = measure(request, progress)
     except MeasurementError as trouble:
-        if not followed:
-            raise
-        request.warnings.append(f"no curve, the track alone is written: {trouble.message}")
-        return None
-    if request.drop is not None and request.drop.height is not None and request.drop.height.value > 0:
-        doubt = video.check_drop_height(curve, request.drop.height)
-        if doubt:
-            request.warnings.append(doubt)
-    return curve
+        seen = draw_failure(request, folder, trouble)
+        more = f"; {seen} shows what was seen" if seen else ""
+        raise MeasurementError(trouble.where, trouble.key, trouble.message + more) from None
+    written = write_files(folder, found)
+    summary = summarise(found)
+    options.write_json(folder / "drop.json", summary)
+    return summary, tell(summary, found.curve, folder, [*written, "drop.json"])
+
+
+def ask(source: Path, given: dict[str, Any]) -> Request:
+    """The options of the command line as ``read_request`` takes them; its complaints in their names."""
+    mapping = None
+    if given["columns"] is not None:
+        try:
+            mapping = read_mapping(given["columns"])
+        except ValueError as trouble:
+            raise LabsimError("command line", "--columns", str(trouble)) from None
+    try:
+        return read_request(
+            source,
+            frame_rate=given["fps"],
+            pixel_size=_take(given["pixel_um"], given["pixel_um_sigma"], 1e-6),
+            rod_diameter=_take(given["rod_diameter_mm"], given["rod_diameter_sigma_mm"], 1e-3),
+            ruler=given["ruler"],
+            ruler_step=1e-3 * given["ruler_step_mm"],
+            surface_row=given["surface_row"],
+            surface_row_sigma=given["surface_row_sigma"],
+            row_sigma=given["row_sigma"],
+            rotate=given["rotate"],
+            frames=None if given["part"] is None else read_range(given["part"]),
+            columns=mapping,
+            particle=given["particle"],
+        )
+    except MeasurementError as trouble:
+        key = ", ".join(OPTIONS.get(name, name) for name in trouble.key.split(", "))
+        raise MeasurementError(trouble.where, key, trouble.message) from None
+
+
+def _take(value: float | None, sigma: float, unit: float) -> Measured | None:
+    return None if value is None else Measured(unit * value, unit * sigma)
+
+
+def read_range(text: str) -> tuple[int, int]:
+    first, dash, last = text.partition("-")
+    if not (dash and first.strip().isdecimal() and last.strip().isdecimal()):
+        raise LabsimError("command line", "--frames", f"{text!r} is no range; write FIRST-LAST, as 118-201")
+    return int(first), int(last)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -112,7 +113,7 @@ def draw_rows(track: Track, path: Path, title: str = "") -> Path:
     return path
 
 
-def draw_frames(pictures: list[np.ndarray], captions: list[str], path: Path) -> Path:
+def draw_frames(pictures: list[np.ndarray], captions: list[str], path: Path, title: str = "") -> Path:
     """Contact sheet of frames with the track on them."""
     if not pictures:
         return path
@@ -120,12 +121,43 @@ def draw_frames(pictures: list[np.ndarray], captions: list[str], path: Path) -> 
     columns = len(pictures) if tall > 1.4 else max(1, (len(pictures) + 1) // 2)
     rows = -(-len(pictures) // columns)
     wide = 9.0
-    with new_figure(path, wide, rows * (wide / columns * tall + 0.35)) as figure:
+    with new_figure(path, wide, rows * (wide / columns * tall + 0.35) + (0.6 if title else 0.0)) as figure:
+        if title:
+            figure.suptitle(textwrap.fill(title, 110), fontsize=9)
         for k, axes in enumerate(np.ravel(figure.subplots(rows, columns, squeeze=False))):
             axes.axis("off")
             if k < len(pictures):
                 axes.imshow(pictures[k])
                 axes.set_title(captions[k], fontsize=8.5)
+    return path
+
+
+def draw_table(
+    columns: tuple[str, FloatArray],
+    position: FloatArray,
+    surface: float,
+    path: Path,
+    title: str,
+    *,
+    rows: bool,
+) -> Path:
+    """The two columns of a table of which no motion could be made, and where the surface is said to be.
+
+    columns : name and values of the first; position : rows (px) or heights (m).
+    """
+    with new_figure(path, 7.2, 4.4) as figure:
+        axes = figure.subplots()
+        axes.plot(columns[1], position, ".", ms=3, color=INK)
+        axes.axhline(surface, color=BLUE, lw=1.0)
+        place = (0.01, surface)
+        axes.annotate(
+            "surface", place, xycoords=("axes fraction", "data"), color=BLUE, fontsize=9, va="bottom"
+        )
+        axes.set_xlabel(columns[0])
+        axes.set_ylabel("row (px)" if rows else "height (m)")
+        if rows:
+            axes.invert_yaxis()
+        axes.set_title(textwrap.fill(title, 90), fontsize=9)
     return path
 
 

@@ -9,6 +9,7 @@ from .frames import Frames, open_frames
 from .local import fit_local_polynomial
 from .overlay import draw_contact_sheet, write_overlay
 from .scale import measure_ruler, scale_from_diameter
+from .seen import draw_scene
 from .track_file import make_track, read_track, tabulate_curve, tabulate_track, write_curve, write_track
 from .tracker import Tracking, follow_projectile, track_projectile
 
@@ -17,6 +18,7 @@ __all__ = [
     "Tracking",
     "check_drop_height",
     "draw_contact_sheet",
+    "draw_scene",
     "fit_deceleration",
     "fit_local_polynomial",
     "follow_projectile",

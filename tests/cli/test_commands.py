@@ -98,6 +98,10 @@ def test_a_drop_of_a_campaign_and_a_model_file(tmp_path: Path) -> None:
 
 MISTAKES = {
     "no such command": (["nonsense"], ["No such command", "labsim --help"]),
+    "a typing error": (
+        ["diagnos", "x"],
+        ["No such command 'diagnos'", "did you mean diagnose", "labsim --help"],
+    ),
     "no such option": (["check", "x", "--nonsense"], ["--nonsense"]),
     "missing folder": (["check", "/nonexistent"], ["/nonexistent", "no such folder"]),
     "no argument": (["calibrate"], ["labsim calibrate", "Missing argument", "labsim calibrate --help"]),
@@ -174,17 +178,52 @@ def test_help_fits_a_screen_and_imports_nothing_heavy() -> None:
     assert not imported & {"numba", "scipy", "matplotlib", "emcee", "cv2", "labsim.cli.diagnose"}
 
 
-def test_the_default_output_is_a_new_folder_beside_the_input(tmp_path: Path) -> None:
+def test_the_default_output_is_a_new_folder_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from labsim.cli.options import make_output_folder
 
-    campaign = tmp_path / "series"
+    campaign, here, film = tmp_path / "data" / "series", tmp_path / "here", tmp_path / "data" / "a.b.mp4"
     (campaign / "drops" / "D01").mkdir(parents=True)
     (campaign / "campaign.toml").write_text("")
+    (campaign / "drops/D01/video.avi").write_text("")
+    film.write_text("")
+    here.mkdir()
+    monkeypatch.chdir(here)
     first = make_output_folder(None, campaign, "calibrate")
-    assert first == tmp_path / "series-calibrate"
+    assert first == here / "series-calibrate"
     (first / "file").write_text("")
-    assert make_output_folder(None, campaign, "calibrate") == tmp_path / "series-calibrate-2"
-    assert make_output_folder(None, campaign / "drops" / "D01", "track") == tmp_path / "series-D01-track"
+    assert make_output_folder(None, campaign, "calibrate") == here / "series-calibrate-2"
+    for source, name in (
+        (campaign / "campaign.toml", "series-check"),
+        (campaign / "drops/D01", "series-D01-check"),
+        (campaign / "drops/D01/video.avi", "series-D01-check"),
+        (film, "a.b-check"),
+        (film.parent, "data-check"),
+    ):
+        assert make_output_folder(None, source, "check") == here / name
+    for place in (campaign, campaign / "drops" / "D01"):  # what lies in a campaign is data
+        monkeypatch.chdir(place)
+        assert make_output_folder(None, film, "track") == campaign.parent / "a.b-track"
+    monkeypatch.chdir(film.parent)
+    assert (
+        make_output_folder(None, Path(), "track") == tmp_path / "data-track"
+    )  # a folder of pictures, standing in it
+
+
+def test_only_a_campaign_and_a_folder_that_is_the_input_are_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from labsim.cli.options import make_output_folder
+    from labsim.errors import LabsimError
+
+    (tmp_path / "series").mkdir()
+    (tmp_path / "series" / "campaign.toml").write_text("")
+    film = tmp_path / "ball.mp4"
+    film.write_text("")
+    monkeypatch.chdir(tmp_path)
+    assert make_output_folder(Path("out"), film, "track") == tmp_path / "out"
+    for out, source in ((Path("series/out"), film), (Path("out"), tmp_path), (Path(), tmp_path)):
+        with pytest.raises(LabsimError, match="lies inside the input"):
+            make_output_folder(out, source, "track")
 
 
 def test_a_new_campaign_needs_only_its_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import tifffile
 
 from labsim.cli import main
 
@@ -91,6 +92,102 @@ def test_a_fall_without_a_contact_is_still_a_track(tmp_path, capsys) -> None:
     table = ("--fps", 120, "--pixel-um", 40, "--surface-row", 1700)
     assert run(out / "track.csv", *table, "-o", tmp_path / "again", "-q") == 2
     assert "never reaches the surface" in capsys.readouterr().err
+
+
+def write_fall(path: Path, head: str = "frame,tip_row_px", *, lengths: bool = False) -> Path:
+    """A fall of 0.65 m/s that the dust stops evenly within 2 ms: 10 000 frames/s, 20 µm, surface at row 300."""
+    lines = []
+    for i in range(120):
+        t = i / 1e4 - 0.006
+        depth = 0.65 * t + 4.905 * t * t if t < 0 else 0.65 * (min(t, 2e-3) - min(t, 2e-3) ** 2 / 4e-3)
+        depth += 2e-7 * (i * 7919 % 13 - 6)  # scatter of some 0.03 px
+        lines.append(
+            f"{i / 10:.1f};{1e3 * depth:.6f}".replace(".", ",")
+            if lengths
+            else f"{i},{300 + depth / 2e-5:.4f}"
+        )
+    path.write_text("\n".join([head, *lines]) + "\n")
+    return path
+
+
+SCALES = ("--fps", 10000, "--pixel-um", 20, "--surface-row", 300)
+
+
+def test_everything_that_is_missing_is_named_at_once(tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = write_fall(tmp_path / "fall.csv")
+    assert run(path) == 2
+    assert f"{path}: --fps, --pixel-um, --surface-row: are not in the file" in capsys.readouterr().err
+    assert run(path, "--surface-row", 300, "--fps", 10000) == 2
+    assert f"{path}: --pixel-um: is not in the file; state it" in capsys.readouterr().err
+    (tmp_path / "pictures").mkdir()
+    for k in range(3):
+        tifffile.imwrite(tmp_path / "pictures" / f"{k}.tif", np.full((40, 30), 100 + k, np.uint8))
+    assert run(tmp_path / "pictures") == 2
+    assert "--fps, --pixel-um: are not in the file" in capsys.readouterr().err
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["fall.csv", "pictures"], "no folder is left"
+
+
+def test_a_table_beside_its_output(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_fall(tmp_path / "fall.csv")
+    assert run("fall.csv", *SCALES, "-o", "out") == 0
+    assert run("fall.csv", *SCALES) == 0
+    assert (tmp_path / "out/drop.json").is_file() and (tmp_path / "fall-track/drop.json").is_file()
+    assert f"written to {tmp_path / 'fall-track'}" in capsys.readouterr().out
+
+
+def test_lengths_need_no_camera(tmp_path, monkeypatch, capsys) -> None:
+    """The same fall as rows of a camera and as time and depth in mm with decimal commas: the same figures."""
+    monkeypatch.chdir(tmp_path)
+    rows = write_fall(tmp_path / "rows.csv")
+    lengths = write_fall(tmp_path / "lengths.csv", "t (ms);z (mm)", lengths=True)
+    mapped = write_fall(tmp_path / "mapped.csv", "Zeit;Tiefe", lengths=True)
+    found = {}
+    for path, more in ((rows, SCALES), (lengths, ()), (mapped, ("--columns", "time_ms=Zeit,depth_mm=Tiefe"))):
+        assert run(path, *more, "--row-sigma", 0.1 if path == rows else 0.2, "--json", "-q") == 0
+        found[path.stem] = json.loads(capsys.readouterr().out)
+    for key, off in (("impact_speed_m_s", 1e-4), ("penetration_depth_m", 1e-7), ("stopping_time_s", 2e-6)):
+        assert found["lengths"][key] == pytest.approx(found["rows"][key], abs=off)
+        assert found["mapped"][key] == found["lengths"][key]
+    assert found["lengths"]["pixel_size_source"] == "table"
+    assert any("the table gives lengths" in text for text in found["lengths"]["warnings"])
+    assert run(mapped, "--columns", "time_ms=Zeit") == 2
+    assert "no position" in capsys.readouterr().err
+    assert run(mapped, "--columns", "bild=Zeit") == 2
+    assert "--columns: 'bild' is not known" in capsys.readouterr().err
+
+
+def test_one_of_several_particles(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = write_fall(tmp_path / "fall.csv").read_text().splitlines()[1:]
+    both = [f"{frame},64,{row},{k}" for k in (0, 1) for frame, row in (line.split(",") for line in lines[k:])]
+    (tmp_path / "both.csv").write_text("frame,x,y,particle\n" + "\n".join(both) + "\n")
+    assert run("both.csv", *SCALES) == 2
+    assert "holds 2 tracks (0, 1); choose one with --particle 0" in capsys.readouterr().err
+    assert run("both.csv", *SCALES, "--particle", "1", "-q", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == 119
+    assert run("both.csv", *SCALES, "--particle", "2") == 2
+    assert "'2' is not among its tracks; name one of 0, 1" in capsys.readouterr().err
+
+
+def test_a_failed_track_leaves_a_picture(tmp_path, monkeypatch, capsys) -> None:
+    """A film without a fall, and a table that never reaches the surface: what was seen, not an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    assert run(DATA / "cine_phantom" / "cine_legacy.cine", "-q") == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "cine_legacy-track/seen.png shows what was seen" in said
+    assert [each.name for each in (tmp_path / "cine_legacy-track").iterdir()] == ["seen.png"]
+    assert (tmp_path / "cine_legacy-track/seen.png").stat().st_size > 5000
+    fall = write_fall(tmp_path / "fall.csv")
+    assert run(fall, "--fps", 10000, "--pixel-um", 20, "--surface-row", 900, "-q") == 2
+    assert (tmp_path / "fall-track/seen.png").stat().st_size > 5000
+    # nothing that could be shown: nothing is left behind
+    (tmp_path / "no.mp4").write_bytes(b"\0" * 5000)
+    (tmp_path / "no.csv").write_text("frame,tip_row_px\n0,\n")
+    for name in ("no.mp4", "no.csv"):
+        assert run(name, *SCALES, "-q") == 2
+    assert not (tmp_path / "no-track").exists()
 
 
 def test_damaged_videos_speak_with_one_voice(tmp_path) -> None:

@@ -183,6 +183,13 @@ def test_progress_in_a_log_tells_runs_done_and_time_left(
     assert not any("\x1b" in line for line in lines)
 
 
+def test_progress_in_a_log_promises_nothing_before_it_knows(capsys: pytest.CaptureFixture[str]) -> None:
+    """The first call comes after the first piece of work: how long that took is not known."""
+    with options.show_progress(quiet=False) as progress:
+        progress(1, 300, "looking for what moves")
+    assert capsys.readouterr().err == "looking for what moves: 0%\n"
+
+
 def test_progress_is_silent_when_quiet(capsys: pytest.CaptureFixture[str]) -> None:
     with options.show_progress(quiet=True) as progress:
         progress(1, 2, "work")

@@ -133,7 +133,7 @@ def test_what_is_wrong_is_named(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["frame", "frame=", "bild=Frame", "time_px=t", "row_mm=y"])
 def test_a_mapping_that_says_nothing(text: str) -> None:
-    with pytest.raises(ValueError, match="write|known"):
+    with pytest.raises(ValueError, match=r"write|known"):
         read_mapping(text)
 
 
@@ -144,7 +144,9 @@ def test_a_mapping_to_a_column_that_is_not_there(tmp_path: Path) -> None:
 
 
 HUGE = {
-    "a stray quote before 12 000 lines": (lambda: 'frame,y\n0,"280\n' + "".join(f"{i},{280 + i}\n" for i in range(1, 12000)), None),
+    "a stray quote before 12 000 lines": (
+        lambda: 'frame,y\n0,"280\n' + "".join(f"{i},{280 + i}\n" for i in range(1, 12000)), None
+    ),
     "a cell of 50 MB": (lambda: "frame,y\n0," + "1" * 50_000_000 + "\n", "longer than 10000 characters"),
     "five million rows": (lambda: "frame,y\n" + "".join(f"{i},{i}\n" for i in range(5_000_000)), "at most 1000000 frames"),
     "200 MB": (lambda: "frame,y\n" + ("0,1" + " " * 996 + "\n") * 200_000, "bytes; a record of a drop"),
