@@ -118,6 +118,20 @@ def test_a_run_is_simulated_once(tmp_path: Path) -> None:
         labsim.simulate(setting.replace(spacing=5e-4), store=tmp_path)
 
 
+def test_the_example_of_the_package_runs_on_the_campaign_that_ships(
+    shared_store: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The lines of ``labsim.__doc__`` as they stand there; published figures answer as tracks do."""
+    assert labsim.__doc__ is not None
+    lines = [line.strip() for line in labsim.__doc__.splitlines() if line.startswith("    ")]
+    assert len(lines) == 3 and 'read_campaign("my-drops")' in lines[0]
+    monkeypatch.setenv("LABSIM_STORE", shared_store)
+    shipped = f"read_campaign({str(DATA / 'guettler2009')!r})"
+    exec("\n".join(lines).replace('read_campaign("my-drops")', shipped), {"labsim": labsim})
+    p_m, word = capsys.readouterr().out.split()
+    assert 500.0 < float(p_m) < 4000.0 and word == "unknown"
+
+
 def test_tabulate_says_what_it_takes() -> None:
     with pytest.raises(TypeError, match="int is no table"):
         labsim.tabulate(3)

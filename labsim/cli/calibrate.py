@@ -84,7 +84,7 @@ def write_calibration(found: SummaryCalibration, folder: Path) -> tuple[dict, st
     summary = calibration_summary(found)
     options.write_json(folder / "calibration.json", summary)
     (folder / "posterior.nc").unlink(missing_ok=True)
-    found.posterior.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
+    found.posterior.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
     draw_corner(found, folder / "corner.png")
     draw_fit(found, folder / "fit.png")
     return summary, calibration_lines(found)

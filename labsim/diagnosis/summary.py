@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from ..inference.fitting import Hypothesis
 from ..inference.planar import campaign_setting
 from ..inference.published import impact_speed
 from ..inference.readings import Reading
@@ -22,6 +23,7 @@ from ..inference.runs import Progress, RunStore, require_stopped
 from ..inference.summary import COARSE, SummaryCalibration
 from ..records import Drop, FloatArray
 from ..sph import DropRun, DropSetting
+from .judge import Verdict
 from .prediction import Prediction
 from .published_scan import find_distance, predict_scan
 from .published_sizes import (
@@ -53,8 +55,7 @@ class SummaryDiagnosis:
     # depth alone, stopping time alone, difference in sigma of ln p_m
     conflict: tuple[Reading, Reading, float] | None
     p_value: float
-    probability_wrong: float
-    verdict: str
+    verdict: Verdict  # of ("none",) and ("unknown",): published figures carry no search for a cause
     sentence: str
     runs: dict[float, tuple[DropRun, ...]]  # by radius
     scan_run: DropRun | None
@@ -105,7 +106,7 @@ def diagnose_summary(
     for radius, drops in sorted(groups.items()):
         own = [run for run, at in zip(runs, place, strict=True) if at == ("size", radius)]
         sizes.append(Size(radius, drops, own, emulate_runs(own)))
-    p_m = np.clip(calibration.samples, p_grid[0], p_grid[-1])
+    p_m = np.clip(calibration.posterior.samples("p_m_Pa"), p_grid[0], p_grid[-1])
     rows, drop_rows, log_samples, diagonal = predict_sizes(calibration, sizes, p_m)
     scan_run = None
     for scan in scans:
@@ -123,7 +124,6 @@ def diagnose_summary(
     p_value = judge_predictions(rows, log_samples, diagonal)
     rows = predict_calibrated(calibration) + rows
     conflict = _conflict(calibration)
-    probability = bound_probability(p_value)
     warnings = [warning for run in runs for warning in run.warnings]
     return SummaryDiagnosis(
         calibration=calibration,
@@ -135,8 +135,7 @@ def diagnose_summary(
         },
         conflict=conflict,
         p_value=p_value,
-        probability_wrong=probability,
-        verdict="unknown" if p_value < 0.05 else "none",
+        verdict=_judge(p_value),
         sentence=say_summary(calibration, rows, scaling, conflict),
         runs={size.radius: tuple(size.runs) for size in sizes},
         scan_run=scan_run,
@@ -149,7 +148,7 @@ def diagnose_summary(
 
 def _choose_p_m(calibration: SummaryCalibration) -> FloatArray:
     """Three values over the posterior, on a fixed grid."""
-    low, high = np.log(np.quantile(calibration.samples, (0.01, 0.99)))
+    low, high = np.log(np.quantile(calibration.posterior.samples("p_m_Pa"), (0.01, 0.99)))
     low = P_M_STEP * math.floor(low / P_M_STEP)
     high = P_M_STEP * math.ceil(high / P_M_STEP)
     return np.exp(np.round(np.linspace(low, high, 3) / P_M_STEP) * P_M_STEP)
@@ -208,6 +207,14 @@ def judge_predictions(
     law = np.array([r.observed_sigma / r.observed if r.kind == "depth" else 0.0 for r in rows])
     covariance += LAW_SHARED * np.outer(law, law) + (1.0 - LAW_SHARED) * np.diag(law**2)
     return float(chi2.sf(residual @ np.linalg.solve(covariance, residual), len(rows)))
+
+
+def _judge(p_value: float) -> Verdict:
+    wrong = bound_probability(p_value)
+    ranked: list[tuple[Hypothesis, float]] = sorted(
+        [(("unknown",), wrong), (("none",), 1.0 - wrong)], key=lambda each: -each[1]
+    )
+    return Verdict("unknown" if p_value < 0.05 else "none", ranked)
 
 
 def bound_probability(p_value: float) -> float:

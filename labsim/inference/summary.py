@@ -12,7 +12,6 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import emcee
 import numpy as np
@@ -21,6 +20,7 @@ from ..records import Campaign, Drop, FloatArray
 from ..sph import DropRun, DropSetting
 from .emulator import Emulator, fit_emulator
 from .planar import SPACING, campaign_setting
+from .posterior import Posterior
 from .published import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
 from .readings import FigureLikelihood, NumericalError, Reading, integrate_reading, list_readings
 from .runs import Progress, RunStore, require_stopped
@@ -42,10 +42,8 @@ class SummaryCalibration:
     depth_reading: str
     bulk_modulus: float
     figures: tuple[Figure, ...]
-    posterior: Any  # arviz.InferenceData with p_m in Pa
+    posterior: Posterior  # of p_m_Pa
     quantiles: dict[str, float]  # of p_m, Pa: mean, sd, q05 ... q95
-    r_hat: float
-    ess: float
     emulators: dict[
         tuple[str, float], Emulator
     ]  # (drop, bulk modulus) -> depth and stopping time against p_m
@@ -72,11 +70,6 @@ class SummaryCalibration:
             k0: float(np.diff(self.emulators[drop, k0].predict_log(at)[:, 0])[0] / math.log(4.0))
             for k0 in self.numerical
         }
-
-    @property
-    def samples(self) -> FloatArray:
-        """p_m of the posterior, (n,) Pa."""
-        return self.posterior.posterior["p_m"].values.ravel()
 
 
 def calibrate_summary(
@@ -140,8 +133,7 @@ def calibrate_summary(
         )
 
     main = likelihood(use, reading, modulus)
-    posterior, r_hat, ess = _sample(main, campaign.p_m_range, seed, progress)
-    samples = posterior.posterior["p_m"].values.ravel()
+    posterior = _sample(main, campaign.p_m_range, seed, progress)
     found_readings = []
     for k0 in moduli:
         for chosen, name in list_readings(drops, reading, other_readings, tuple(use)):
@@ -151,8 +143,8 @@ def calibrate_summary(
     notes = [warning for found in runs.values() for run in found for warning in run.warnings]
     if any(r.at_limit for r in found_readings if r.bulk_modulus == modulus and r.use == tuple(use)):
         notes.append("the posterior of p_m leans on a limit of its prior; widen material.p_m_range_Pa")
-    if not r_hat < 1.05:
-        notes.append(f"the chains have not mixed (R-hat {r_hat:.3f})")
+    if not posterior.r_hat < 1.05:
+        notes.append(f"the chains have not mixed (R-hat {posterior.r_hat:.3f})")
     return SummaryCalibration(
         campaign=campaign,
         use=tuple(use),
@@ -160,9 +152,7 @@ def calibrate_summary(
         bulk_modulus=modulus,
         figures=main.figures,
         posterior=posterior,
-        quantiles=summarise(samples),
-        r_hat=r_hat,
-        ess=ess,
+        quantiles=summarise(posterior.samples("p_m_Pa")),
         emulators=emulators,
         numerical=numerical,
         readings=tuple(found_readings),
@@ -197,8 +187,8 @@ def _outputs(runs: Sequence[DropRun]) -> FloatArray:
 
 def _sample(
     likelihood: FigureLikelihood, limits: tuple[float, float], seed: int, progress: Progress | None
-) -> tuple[Any, float, float]:
-    """emcee on ln p_m; arviz.InferenceData, R-hat and effective sample size."""
+) -> Posterior:
+    """emcee on ln p_m."""
     low, high = np.log(limits)
 
     def log_probability(position: FloatArray) -> FloatArray:
@@ -219,8 +209,15 @@ def _sample(
         import arviz
     chain = np.exp(np.swapaxes(sampler.get_chain(discard=discard), 0, 1)[:, :, 0])
     data = arviz.from_dict(
-        posterior={"p_m": chain},
+        posterior={"p_m_Pa": chain},
         sample_stats={"lp": np.swapaxes(sampler.get_log_prob(discard=discard), 0, 1)},
         attrs={"unit": "Pa", "prior": f"flat in ln p_m between {limits[0]:g} and {limits[1]:g} Pa"},
     )
-    return data, float(arviz.rhat(data)["p_m"]), float(arviz.ess(data)["p_m"])
+    return Posterior(
+        names=("p_m_Pa",),
+        data=data,
+        r_hat=float(arviz.rhat(data)["p_m_Pa"]),
+        ess=float(arviz.ess(data)["p_m_Pa"]),
+        steps=steps,
+        autocorrelation=float(sampler.get_autocorr_time(discard=discard, quiet=True)[0]),
+    )

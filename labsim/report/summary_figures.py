@@ -174,10 +174,11 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
     """Posterior of p_m, and of the depth and stopping time that go with it, with the published values as lines."""
     drop = calibration.figures[0].drop
     emulator = calibration.emulators[drop, calibration.bulk_modulus]
-    outputs = emulator.predict(calibration.samples[:, None])
+    p_m = calibration.posterior.samples("p_m_Pa")
+    outputs = emulator.predict(p_m[:, None])
     published = next(d.published for d in calibration.campaign.drops if d.name == drop)
     assert published is not None
-    columns = [calibration.samples / 1e3, outputs[:, 0] * 1e3, outputs[:, 1] * 1e3]
+    columns = [p_m / 1e3, outputs[:, 0] * 1e3, outputs[:, 1] * 1e3]
     truths: list[float | None] = [None, None, None]
     if published.penetration_depth is not None:
         truths[1] = expected_raw_depth(published.penetration_depth.value, calibration.depth_reading) * 1e3

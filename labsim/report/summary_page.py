@@ -46,8 +46,8 @@ def write_page(diagnosis: SummaryDiagnosis, folder: Path) -> Path:
         name=campaign.name,
         description=campaign.description,
         page_title="what the simulation gets wrong",
-        tone=diagnosis.verdict,
-        badge=BADGES[diagnosis.verdict],
+        tone=diagnosis.verdict.word,
+        badge=BADGES[diagnosis.verdict.word],
         sentence=diagnosis.sentence,
         tiles=[
             ("p_m", f"{q['q50'] / 1e3:.2f} kPa", f"90 %: {q['q05'] / 1e3:.2f} to {q['q95'] / 1e3:.2f} kPa"),

@@ -97,8 +97,8 @@ def scaling_lines(diagnosis: SummaryDiagnosis) -> list[str]:
 
 def verdict_text(diagnosis: SummaryDiagnosis) -> str:
     return (
-        f"verdict: {diagnosis.verdict} (p = {diagnosis.p_value:.2g} for all predictions together): "
-        f"{VERDICTS[diagnosis.verdict]}"
+        f"verdict: {diagnosis.verdict.word} (p = {diagnosis.p_value:.2g} for all predictions together): "
+        f"{VERDICTS[diagnosis.verdict.word]}"
     )
 
 
@@ -115,8 +115,8 @@ def calibration_summary(calibration: SummaryCalibration) -> dict[str, Any]:
         "planar_correction": calibration.depth_reading,
         "bulk_modulus_Pa": calibration.bulk_modulus,
         "p_m_Pa": calibration.quantiles,
-        "r_hat": calibration.r_hat,
-        "ess": calibration.ess,
+        "r_hat": calibration.posterior.r_hat,
+        "ess": calibration.posterior.ess,
         "readings": [
             {
                 "use": list(r.use),
@@ -151,20 +151,16 @@ def diagnosis_summary(diagnosis: SummaryDiagnosis) -> dict[str, Any]:
     """diagnosis.json: the contract's keys, and the table and sentence of published figures."""
     calibration = diagnosis.calibration
     error = calibration.numerical[calibration.bulk_modulus]
-    wrong = diagnosis.probability_wrong
     scaling = diagnosis.scaling
     return {
         "format": 1,
         "campaign": calibration.campaign.name,
-        "verdict": diagnosis.verdict,
+        "verdict": diagnosis.verdict.word,
         "p_value": diagnosis.p_value,
-        "causes": sorted(
-            [
-                {"causes": ["unknown"], "probability": wrong, "parameters": {}},
-                {"causes": ["none"], "probability": 1.0 - wrong, "parameters": {}},
-            ],
-            key=lambda cause: -cause["probability"],
-        ),
+        "causes": [
+            {"causes": list(causes), "probability": probability, "parameters": {}}
+            for causes, probability in diagnosis.verdict.probabilities
+        ],
         "confusable": [],
         "p_m_Pa": {"nominal": calibration.quantiles},
         "sentence": diagnosis.sentence,

@@ -131,7 +131,7 @@ def test_every_file_is_there(first: tuple[Path, str]) -> None:
         import arviz
     posterior = arviz.from_netcdf(folder / "posterior.nc")
     p_m = load(folder, "calibration.json")["p_m_Pa"]
-    assert float(np.median(posterior.posterior["p_m"])) == pytest.approx(p_m["q50"])
+    assert float(np.median(posterior.posterior["p_m_Pa"])) == pytest.approx(p_m["q50"])
 
 
 def test_a_second_time_takes_seconds_and_gives_the_same(
