@@ -168,7 +168,10 @@ def _mark(item: Item) -> str:
 def _hash_code() -> str:
     """Of the packages that measure."""
     home = Path(__file__).parents[1]
-    parts = [_provenance.hash_input(home / name) for name in ("video", "ct", "records.py", "campaign.py")]
+    parts = [
+        _provenance.hash_input(home / name)
+        for name in ("video", "ct", "tracks", "tracking.py", "records.py", "campaign.py")
+    ]
     return "".join(parts)
 
 
