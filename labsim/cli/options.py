@@ -52,7 +52,9 @@ def make_output_folder(out: Path | None, source: Path, command: str) -> Path:
     out = out.resolve()
     if (outside := _leave_input(out, source)) != out:
         raise LabsimError(
-            out, "--out", f"lies inside the input; name a folder outside it, as {outside / out.name}"
+            out,
+            "--out",
+            f"lies inside the input or a campaign; name a folder outside, as {outside / out.name}",
         )
     new = not out.exists()
     try:

@@ -190,7 +190,7 @@ def _choose(path: Path, names: list[str], particle: str | None) -> str:
     raise MeasurementError(
         path,
         "track",
-        f"holds {len(names)} tracks ({shown}); choose one with --particle {example} of labsim track",
+        f"holds {len(names)} tracks ({shown}); choose one with --particle {example} (labsim track)",
     )
 
 

@@ -21,7 +21,7 @@ from .lines import find_mark, read_lines, split_line
 NAME = "tables (CSV) of frame or time, and row, depth or height"
 GENERAL = True  # asked after all other formats
 SUFFIXES = {".csv", ".txt", ".tsv", ".dat"}
-SHOWN = "write frame,tip_row_px, or name them as --columns frame=COLUMN,row=COLUMN"
+SHOWN = "write frame,tip_row_px, or name them to labsim track: --columns frame=COLUMN,row=COLUMN"
 
 # what a column is -> names that say so, without case, blanks and underscores; the first of each is labsim's own
 NAMES = {

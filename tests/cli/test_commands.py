@@ -222,7 +222,7 @@ def test_only_a_campaign_and_a_folder_that_is_the_input_are_closed(
     monkeypatch.chdir(tmp_path)
     assert make_output_folder(Path("out"), film, "track") == tmp_path / "out"
     for out, source in ((Path("series/out"), film), (Path("out"), tmp_path), (Path(), tmp_path)):
-        with pytest.raises(LabsimError, match="lies inside the input"):
+        with pytest.raises(LabsimError, match="lies inside the input or a campaign"):
             make_output_folder(out, source, "track")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from campaign_files import CAMPAIGN, DROP
 
+import labsim
 from labsim.campaign import read_campaign
 from labsim.errors import CampaignError, MeasurementError
 from labsim.inference.observe import read_observed_track
@@ -177,15 +178,16 @@ def campaign(tmp_path: Path) -> Path:
     return tmp_path / "c"
 
 
-@pytest.mark.parametrize("file", ["drops/D01/track.csv", "drops/D01/drop.toml", "campaign.toml"])
-def test_a_pipe_is_no_file(file: str, campaign: Path) -> None:
+def test_a_pipe_is_no_file(campaign: Path) -> None:
     """Nobody writes into it: to open it would wait for ever."""
-    (campaign / file).unlink()
-    os.mkfifo(campaign / file)
-    with pytest.raises(CampaignError, match=Path(file).stem):
+    path = campaign / "drops/D01/track.csv"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(CampaignError, match=r"track\.csv is not there"):
         read_campaign(campaign)
-    with pytest.raises(MeasurementError, match="is no plain file"):
-        read_rows(campaign / file, CAMERA)
+    for read in (lambda: read_rows(path, CAMERA), lambda: labsim.track(path)):
+        with pytest.raises(MeasurementError, match="is no plain file"):
+            read()
 
 
 def test_frames_without_a_position_are_read_alike(campaign: Path) -> None:
@@ -211,3 +213,27 @@ def test_a_table_of_another_program_is_a_campaigns_track(campaign: Path) -> None
     path.write_text("Zeit t (ms);z (mm)\n".replace("Zeit ", "") + "\n".join(lines).replace(".", ",") + "\n")
     after = read_observed_track(read_campaign(campaign).drops[0])
     assert np.allclose(after.tip_row, before.tip_row, atol=1e-4) and np.array_equal(after.time, before.time)
+
+
+@pytest.mark.parametrize(
+    "name", ["own", "decimal commas, time and depth", "trackpy", "blanks, after numpy.savetxt"]
+)
+def test_damaged_tables_end_in_one_line(name: str, tmp_path: Path) -> None:
+    """Bytes changed, cut, doubled: rows, or one line with the file in it; and rows are finite and in their order."""
+    file, text, _ = SAME[name]
+    whole, random, path = text.encode(), np.random.default_rng(5), tmp_path / file
+    for number in range(150):
+        damaged = bytearray(whole[: random.integers(1, len(whole))] if number % 3 == 0 else whole)
+        for place in random.integers(0, len(damaged), 4):
+            damaged[place] = random.integers(0, 256)
+        if number % 3 == 1:
+            at = int(random.integers(0, len(damaged)))
+            damaged[at:at] = damaged[at : at + 40]
+        path.write_bytes(damaged)
+        try:
+            found = read_rows(path, CAMERA)
+        except MeasurementError as trouble:
+            assert str(path) in str(trouble) and len(str(trouble)) < 600 + len(str(path))
+        else:
+            assert np.all(np.diff(found.frame) > 0) and np.all(np.diff(found.time) > 0)
+            assert np.all(np.isfinite(found.time))
