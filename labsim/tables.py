@@ -12,6 +12,25 @@ from .records import Measured
 
 _REQUIRED: Any = object()
 EXPLAINED = "labsim new DIR writes a campaign with every table and key explained"
+UNITS = {
+    "m",
+    "cm",
+    "mm",
+    "um",
+    "px",
+    "s",
+    "ms",
+    "us",
+    "g",
+    "mg",
+    "kg",
+    "m3",
+    "pa",
+    "kpa",
+    "hz",
+    "khz",
+    "deg",
+}  # in keys
 
 
 class Table:
@@ -40,11 +59,10 @@ class Table:
 
     def _find_instead(self, key: str) -> str:
         """The key that may have been meant by it, where there is one that nobody has asked for; otherwise where to look it up."""
-        others = {other for other in self.values if other not in self.known and not _are_siblings(key, other)}
-        near = _nearest(key, others)
-        if near is None:
-            return f"add it ({EXPLAINED})"
-        return f"{near} is not a key of the campaign format: did you mean {key}?"
+        for other in self.values:
+            if other not in self.known and _may_mean(other, key):
+                return f"{other} is not a key of the campaign format: did you mean {key}?"
+        return f"add it ({EXPLAINED})"
 
     def number(
         self,
@@ -196,18 +214,24 @@ class Document:
             table.close()
 
 
-def _are_siblings(key: str, other: str) -> bool:
-    """phi_1 and phi_2, height_mm and height_sigma_mm: keys that resemble each other and are both of the format."""
-    words, others = key.lower().split("_"), other.lower().split("_")
-    if ("sigma" in words) != ("sigma" in others):
-        return True
-    return words[:-1] == others[:-1] and len(words[-1]) == len(others[-1]) == 1
+def _may_mean(other: str, key: str) -> bool:
+    """mass_g for mass_mg, diamter_mm for diameter_mm; not phi_2 for phi_1, depth_mm for diameter_mm or the sigma of a key."""
+    (stem, number), (wanted, counted) = _split_key(other), _split_key(key)
+    if ("sigma" in other.split("_")) != ("sigma" in key.split("_")) or number != counted:
+        return False
+    return _nearest(stem, {wanted}, 0.8) is not None
 
 
-def _nearest(word: str, known: set[str]) -> str | None:
+def _split_key(key: str) -> tuple[str, str]:
+    """A key without its unit, and the single letter or digit that tells it from its siblings."""
+    words = [word for word in key.lower().split("_") if word not in UNITS]
+    return "_".join(words), words[-1] if words and len(words[-1]) == 1 else ""
+
+
+def _nearest(word: str, known: set[str], cutoff: float = 0.6) -> str | None:
     import difflib
 
-    return next(iter(difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)), None)
+    return next(iter(difflib.get_close_matches(word, sorted(known), n=1, cutoff=cutoff)), None)
 
 
 def _guess_unit(value: float, low: float, high: float) -> str:

@@ -145,6 +145,25 @@ MISTAKES = {
 }  # fmt: skip
 
 
+def test_a_key_of_the_format_is_never_taken_for_another(campaign: Path) -> None:
+    """Each key left out in turn: the message says to add it, and suspects none of those that are there."""
+    asked = 0
+    for file in (C, D, S):
+        text = (campaign / file).read_text()
+        for line in text.splitlines():
+            if " = " not in line:
+                continue
+            (campaign / file).write_text(text.replace(line + "\n", "", 1))
+            try:
+                read_campaign(campaign)
+            except CampaignError as trouble:
+                if "is missing" in trouble.message:
+                    asked += 1
+                    assert "labsim new DIR" in trouble.message, trouble
+        (campaign / file).write_text(text)
+    assert asked > 35
+
+
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_mistake_is_named_in_one_line(
     name: str, campaign: Path, capsys: pytest.CaptureFixture[str]
