@@ -26,6 +26,7 @@ Measure = Callable[
 ]  # source, target, given -> summary, lines
 Files = dict[str, bytes]
 LARGEST_SENT = 1 << 31  # bytes of one item through a scheduler
+FAILED = "failed.json"  # why there is no summary among the files of one measurement; it stays with the sender
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,12 @@ def measure_one(measure: Measure, source: Path | tuple[str, Files], given: dict[
                     file = source / part
                     file.parent.mkdir(parents=True, exist_ok=True)
                     file.write_bytes(content)
-            measure(source, target, given)
+            try:
+                measure(source, target, given)
+            except LabsimError as trouble:
+                if not any(target.iterdir()):
+                    raise
+                (target / FAILED).write_text(json.dumps([trouble.where, trouble.key, trouble.message]))
             return {
                 file.relative_to(target).as_posix(): file.read_bytes()
                 for file in sorted(target.rglob("*"))
@@ -184,20 +190,23 @@ def _find(file: Path, mark: str) -> dict[str, Any] | None:
 
 
 def _write(files: Files, target: Path, summary_name: str, mark: str) -> dict[str, Any]:
-    """Each file aside and renamed, the summary last: where it is, the others are whole."""
+    """Each file aside and renamed, the summary last: where it is, the others are whole. Raises LabsimError where it failed."""
     target.mkdir(parents=True, exist_ok=True)
     (target / summary_name).unlink(missing_ok=True)
     for name, content in files.items():
         part = PurePosixPath(name)
         if part.is_absolute() or ".." in part.parts:
             raise LabsimError(target, name, "is no name of a result")
-        if name == summary_name:
+        if name in (summary_name, FAILED):
             continue
         file = target / part
         file.parent.mkdir(parents=True, exist_ok=True)
         aside = file.with_name(f".{file.name}.{os.getpid()}")
         aside.write_bytes(content)
         os.replace(aside, file)
+    if FAILED in files:
+        where, key, message = json.loads(files[FAILED])
+        raise LabsimError(where, key, f"{message}; {target} holds what was seen")
     summary: dict[str, Any] = json.loads(files[summary_name])
     summary.pop("wall_s", None)
     options.write_json(target / summary_name, summary, item=mark)

@@ -63,23 +63,20 @@ def _choose_moments(found: Track, curve: DecelerationCurve | None) -> list[int]:
     )
 
 
-def draw_failure(request: Request, folder: Path, trouble: LabsimError) -> Path | None:
-    """What was seen of a record that could not be measured, with the reason; None where nothing can be shown."""
+def draw_failure(request: Request, path: Path, trouble: LabsimError) -> None:
+    """What was seen of a record that could not be measured, with the reason; nothing where nothing can be shown."""
     from ..report import track_figures
 
-    path = folder / "seen.png"
-    with suppress(LabsimError):
-        if request.frames is not None:
-            pictures, captions = video.draw_scene(request.frames)
-            return track_figures.draw_frames(pictures, captions, path, trouble.message)
-        assert request.points is not None
+    if request.frames is not None:
+        with suppress(LabsimError):
+            track_figures.draw_frames(*video.draw_scene(request.frames), path, trouble.message)
+    if request.points is not None:
         _name, points = request.points
         rows = points.row is not None
         position = points.row if rows else points.height
         columns = ("time (s)", points.time) if points.time is not None else ("frame", points.frame)
         surface = request.surface.value if request.surface and rows else 0.0
-        return track_figures.draw_table(columns, position, surface, path, trouble.message, rows=rows)  # type: ignore[arg-type]
-    return None
+        track_figures.draw_table(columns, position, surface, path, trouble.message, rows=rows)  # type: ignore[arg-type]
 
 
 def summarise(tracked: Tracked) -> dict[str, Any]:

@@ -27,6 +27,7 @@ OPTIONS = {
     "columns": "--columns",
     "particle": "--particle",
 }
+SEEN = "seen.png"  # of a record that could not be measured
 
 
 def track(
@@ -126,7 +127,11 @@ def track(
     request = ask(drop, given)  # before a folder is made
     folder = options.make_output_folder(out, drop, "track")
     with options.show_progress(quiet) as progress:
-        summary, lines = _track(request, folder, progress)
+        try:
+            summary, lines = _track(request, folder, progress)
+        except MeasurementError as trouble:
+            more = f"; {folder / SEEN} shows what was seen" if (folder / SEEN).is_file() else ""
+            raise MeasurementError(trouble.where, trouble.key, trouble.message + more) from None
     options.finish(summary, lines, as_json=as_json, quiet=quiet)
 
 
@@ -138,12 +143,12 @@ def track_one(
 
 
 def _track(request: Request, folder: Path, progress: options.Progress | None) -> tuple[dict[str, Any], str]:
+    (folder / SEEN).unlink(missing_ok=True)
     try:
         found = measure(request, progress)
     except MeasurementError as trouble:
-        seen = draw_failure(request, folder, trouble)
-        more = f"; {seen} shows what was seen" if seen else ""
-        raise MeasurementError(trouble.where, trouble.key, trouble.message + more) from None
+        draw_failure(request, folder / SEEN, trouble)
+        raise
     written = write_files(folder, found)
     summary = summarise(found)
     options.write_json(folder / "drop.json", summary)

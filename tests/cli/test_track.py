@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import tifffile
+from campaign_files import CAMPAIGN, DROP, fill_in
 
 from labsim.cli import main
 
@@ -182,6 +183,21 @@ def test_a_failed_track_leaves_a_picture(tmp_path, monkeypatch, capsys) -> None:
     fall = write_fall(tmp_path / "fall.csv")
     assert run(fall, "--fps", 10000, "--pixel-um", 20, "--surface-row", 900, "-q") == 2
     assert (tmp_path / "fall-track/seen.png").stat().st_size > 5000
+    # of a drop of a campaign, too, and of the others the results
+    folder = tmp_path / "series"
+    for name, surface in (("D01", 300.0), ("D02", 302.0)):
+        (folder / "drops" / name).mkdir(parents=True)
+        text = DROP.replace("sequence = 3", f"sequence = {name[-1]}")
+        (folder / "drops" / name / "drop.toml").write_text(fill_in(text, surface_row_px=surface))
+        (folder / "drops" / name / "track.csv").write_text(fall.read_text())
+    (folder / "drops/D02/track.csv").write_text(
+        "frame,tip_row_px\n" + "".join(f"{i},{i * 35}\n" for i in range(11))
+    )
+    (folder / "campaign.toml").write_text(CAMPAIGN)
+    assert run(folder, "-q", "--workers", 1) == 2
+    assert f"{tmp_path / 'series-track' / 'D02'} holds what was seen" in capsys.readouterr().err
+    assert [each.name for each in (tmp_path / "series-track/D02").iterdir()] == ["seen.png"]
+    assert (tmp_path / "series-track/D01/drop.json").is_file()
     # nothing that could be shown: nothing is left behind
     (tmp_path / "no.mp4").write_bytes(b"\0" * 5000)
     (tmp_path / "no.csv").write_text("frame,tip_row_px\n0,\n")
