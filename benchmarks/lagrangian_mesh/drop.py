@@ -2,8 +2,7 @@
 
     python benchmarks/lagrangian_mesh/drop.py --speed 0.65,0.30 --tip-radius-mm 0.5 --cells 8,16
 
-Speeds and cells may be lists; a table, one row a drop. Where the independent solver of data/reference has the same drop, its
-limits of D and T_s stand beside.
+Speeds and cells may be lists; prints Markdown, a column a drop.
 """
 
 from __future__ import annotations
@@ -11,180 +10,13 @@ from __future__ import annotations
 import argparse
 import csv
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import mesh
 import numpy as np
-from tip import measure_tip
+from mesh import Dust, Numerics, Result, run_drop
+from tip import measure_tip, print_table
 
 STOPS = Path(__file__).parents[2] / "data" / "reference" / "independent_stops.csv"
-BEAD_DENSITY = 2540.0  # kg/m^3
-
-
-@dataclass(frozen=True)
-class Dust:
-    p_m: float = 1300.0
-    filling_factor: float = 0.15
-    phi_1: float = 0.12
-    phi_2: float = 0.58
-    delta: float = 0.58
-    bulk_modulus: float = 45e3
-    shear_to_bulk: float = 0.5
-    shear_factor: float = 1.0
-    tensile_factor: float = 1.0
-    solid: float = 2000.0
-
-    @property
-    def law(self) -> np.ndarray:
-        """The numbers that the mesh takes, in its order."""
-        return np.array(
-            [
-                self.p_m, self.phi_1, self.phi_2, self.delta * np.log(10.0), self.bulk_modulus,
-                self.shear_to_bulk, self.shear_factor, self.tensile_factor, self.solid,
-            ]
-        )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Numerics:
-    cells: float = 8.0  # in a tip radius, where the mesh is even
-    growth: float = 1.12  # of a cell to the next beyond ``even``; 1: even everywhere
-    even: float = 1.5  # tip radii from the axis and from the surface
-    width: float = 6.0  # tip radii
-    depth: float = 6.0  # tip radii
-    courant: float = 0.6
-    linear: float = 0.06  # bulk viscosity
-    quadratic: float = 1.2
-    hourglass: float = 0.1
-
-
-@dataclass(frozen=True)
-class Result:
-    """time, depth, speed, force on the projectile: (k,), SI. r, z, volume, phi of the cells at the stop: (n, m); nodes_r, nodes_z
-    (n+1, m+1). energies in J, and energy_error in kinetic energies at contact."""
-
-    time: np.ndarray = field(repr=False)
-    depth: np.ndarray = field(repr=False)
-    speed: np.ndarray = field(repr=False)
-    force: np.ndarray = field(repr=False)
-    stopping_time: float
-    stopping_depth: float
-    r: np.ndarray = field(repr=False)
-    z: np.ndarray = field(repr=False)
-    volume: np.ndarray = field(repr=False)
-    phi: np.ndarray = field(repr=False)
-    nodes_r: np.ndarray = field(repr=False)
-    nodes_z: np.ndarray = field(repr=False)
-    energies: dict[str, float]
-    energy_error: float
-    steps: int
-
-
-def grade(even: float, whole: float, h: float, growth: float) -> np.ndarray:
-    """Edges of the cells: h wide up to ``even``, from there each ``growth`` times the last, to ``whole`` at least."""
-    edges = list(np.arange(round(even / h) + 1) * h)
-    width = h
-    while edges[-1] < whole - 0.5 * width:
-        width *= growth
-        edges.append(edges[-1] + width)
-    return np.array(edges)
-
-
-def lay_mesh(r: np.ndarray, z: np.ndarray, dust: Dust, gravity: float) -> np.ndarray:
-    """Cells (n, m, 8) of dust at rest between nodes (n+1, m+1): under its own weight as far as it bears it elastically."""
-
-    def mean(x: np.ndarray) -> np.ndarray:
-        return 0.25 * (x[:-1, :-1] + x[1:, :-1] + x[:-1, 1:] + x[1:, 1:])
-
-    cells = np.zeros((r.shape[0] - 1, r.shape[1] - 1, mesh.COLUMNS))
-    across_r, across_z = r[:-1, 1:] - r[1:, :-1], z[:-1, 1:] - z[1:, :-1]
-    other_r, other_z = r[1:, 1:] - r[:-1, :-1], z[1:, 1:] - z[:-1, :-1]
-    cells[..., mesh.VOLUME] = mean(r) * 0.5 * (across_r * other_z - other_r * across_z)
-    phi = dust.filling_factor
-    cells[..., mesh.PHI] = phi
-    cells[..., mesh.MASS] = phi * dust.solid * cells[..., mesh.VOLUME]
-    crush, _ = mesh.find_strengths(phi, dust.law)
-    pressure = np.minimum(-phi * dust.solid * gravity * mean(z), 0.999 * crush)
-    cells[..., mesh.PRESSURE] = pressure
-    cells[..., mesh.PHI0] = [
-        [mesh.find_unstressed(phi, p, dust.bulk_modulus) for p in row] for row in pressure
-    ]
-    return cells
-
-
-def find_elastic_energy(cells: np.ndarray, dust: Dust) -> float:
-    """Per radian: what the way from φ to φ0′ gives back, and that of the deviatoric stress."""
-    ratio = cells[..., mesh.PHI] / cells[..., mesh.PHI0]
-    bulk = dust.bulk_modulus * (cells[..., mesh.PHI0] / mesh.REFERENCE) ** 4
-    srr, szz, srz = (cells[..., k] for k in (mesh.SRR, mesh.SZZ, mesh.SRZ))
-    volumetric = bulk * ratio * (np.log(ratio) + 1.0 / ratio - 1.0)
-    shear = (srr**2 + szz**2 + (srr + szz) ** 2 + 2.0 * srz**2) / (4.0 * dust.shear_to_bulk * bulk)
-    return float(np.sum((volumetric + shear) * cells[..., mesh.VOLUME]))
-
-
-def run_drop(
-    dust: Dust,
-    radius: float,
-    speed: float,
-    numerics: Numerics = Numerics(),
-    mass: float | None = None,
-    sphere: bool = False,
-    gravity: float = 9.81,
-) -> Result:
-    """Run one drop to its stop; mass (kg) is that of a glass bead by default. RuntimeError where the mesh tangles."""
-    mass = BEAD_DENSITY * 4 / 3 * np.pi * radius**3 if mass is None else mass
-    h = radius / numerics.cells
-    edges_r = grade(numerics.even * radius, numerics.width * radius, h, numerics.growth)
-    edges_z = grade(numerics.even * radius, numerics.depth * radius, h, numerics.growth)
-    r, z = (np.ascontiguousarray(x) for x in np.meshgrid(edges_r, -edges_z, indexing="ij"))
-    cells = lay_mesh(r, z, dust, gravity)
-    elastic = find_elastic_energy(cells, dust)
-    curve = np.zeros((400_000, 4))
-    body = np.array([radius, mass / (2 * np.pi), speed, float(sphere)])
-    damping = np.array([numerics.linear, numerics.quadratic, numerics.hourglass])
-    steps, spent = mesh.advance(
-        r, z, cells, dust.law, damping, body, gravity, numerics.courant, 60.0 * radius, curve
-    )
-    if steps < 0:
-        raise RuntimeError(
-            f"the mesh tangled {-curve[-steps, 1] / radius:.2f} tip radii deep, at {-curve[-steps, 2]:.2f} m/s; "
-            "it serves to about 1.5 radii"
-        )
-    curve = curve[: steps + 1].copy()
-    clock, height, velocity, force = curve.T
-    if velocity[-1] < 0.0:
-        raise RuntimeError(f"no stop within {clock[-1] * 1e3:.3g} ms")
-    back = velocity[-1] / (velocity[-1] - velocity[-2]) * (clock[-1] - clock[-2])
-    elastic = find_elastic_energy(cells, dust) - elastic
-    energies = {
-        "kinetic at contact": 0.5 * mass * speed**2,
-        "gravity": -mass * gravity * height[-1] - 2 * np.pi * spent[5],
-        "kinetic": 2 * np.pi * spent[4] + 0.5 * mass * velocity[-1] ** 2,
-        "elastic": 2 * np.pi * elastic,
-        "plastic": 2 * np.pi * (spent[0] - elastic),
-        "viscous": 2 * np.pi * spent[1],
-        "hourglass": 2 * np.pi * spent[2],
-        "contact": 2 * np.pi * spent[3],
-    }
-    brought, gained, *left = energies.values()
-    return Result(
-        time=clock,
-        depth=-height,
-        speed=-velocity,
-        force=2 * np.pi * force,
-        stopping_time=clock[-1] - back,
-        stopping_depth=-(height[-1] - 0.5 * back * velocity[-1]),
-        r=0.25 * (r[:-1, :-1] + r[1:, :-1] + r[:-1, 1:] + r[1:, 1:]),
-        z=0.25 * (z[:-1, :-1] + z[1:, :-1] + z[:-1, 1:] + z[1:, 1:]),
-        volume=2 * np.pi * cells[..., mesh.VOLUME],
-        phi=cells[..., mesh.PHI],
-        nodes_r=r,
-        nodes_z=z,
-        energies=energies,
-        energy_error=(brought + gained - sum(left)) / brought,
-        steps=steps,
-    )
 
 
 def find_limits(radius_mm: float, speed: float) -> tuple[float, float] | None:
@@ -194,6 +26,35 @@ def find_limits(radius_mm: float, speed: float) -> tuple[float, float] | None:
             if float(row["tip_radius_mm"]) == radius_mm and float(row["speed_m_s"]) == speed:
                 return float(row["depth_mm_limit"]), float(row["stopping_time_ms_limit"])
     return None
+
+
+def describe(
+    found: Result, seconds: float, tip: float, cells: float, limits: tuple[float, float] | None
+) -> dict[str, str]:
+    """One drop's column of the table."""
+    mine = found.stopping_depth * 1e3, found.stopping_time * 1e3
+    off = ["" if limits is None else f" ({100 * (mine[k] / limits[k] - 1):+.1f} %)" for k in range(2)]
+    half = np.interp(0.5 * found.stopping_time, found.time, found.depth) / found.stopping_depth
+    column = {
+        "D mm": f"{mine[0]:.4f}{off[0]}",
+        "T_s ms": f"{mine[1]:.3f}{off[1]}",
+        "D(T_s/2)/D": f"{half:.3f}",
+    }
+    places = (x.ravel() for x in (found.r, found.z, found.volume, found.phi))
+    figures = measure_tip(*places, found.stopping_depth, tip, tip / cells)
+    column |= {name: f"{value:.3f}" for name, value in figures.items()}
+    at_contact = found.energies["kinetic at contact"]
+    column |= {
+        f"{name}, %": f"{100 * value / at_contact:.2f}"
+        for name, value in found.energies.items()
+        if name != "kinetic at contact"
+    }
+    return column | {
+        "energy missing, %": f"{100 * found.energy_error:+.3f}",
+        "cells": f"{found.phi.size}",
+        "steps": f"{found.steps}",
+        "CPU s": f"{seconds:.2f}",
+    }
 
 
 def main() -> None:
@@ -206,64 +67,43 @@ def main() -> None:
 
     parser.add_argument("--speed", type=numbers, default=[0.65], help="m/s")
     parser.add_argument("--tip-radius-mm", type=float, default=0.5)
-    parser.add_argument("--mass-mg", type=float, help="a glass bead's by default")
+    parser.add_argument("--mass-mg", type=float, help="a glass bead's of the tip's radius by default")
     parser.add_argument("--sphere", action="store_true", help="a sphere instead of the end of a rod")
     parser.add_argument("--cells", type=numbers, default=[8.0], help="in a tip radius")
-    for name, kind in (("p_m", Dust), ("bulk_modulus", Dust), ("growth", Numerics), ("even", Numerics),
-                       ("width", Numerics), ("depth", Numerics), ("courant", Numerics), ("linear", Numerics),
-                       ("hourglass", Numerics)):  # fmt: skip
-        parser.add_argument(f"--{name.replace('_', '-')}", type=float, default=getattr(kind(), name))
+    parser.add_argument("--p-m", type=float, default=Dust.p_m, help="Pa")
+    parser.add_argument("--bulk-modulus-kpa", type=float, default=Dust.bulk_modulus * 1e-3)
+    for choice in ("growth", "even", "width", "depth", "courant", "linear", "quadratic", "hourglass"):
+        parser.add_argument(f"--{choice}", type=float, default=getattr(Numerics, choice))
     given = parser.parse_args()
-    dust = Dust(p_m=given.p_m, bulk_modulus=given.bulk_modulus)
-    radius = given.tip_radius_mm * 1e-3
+    dust = Dust(p_m=given.p_m, bulk_modulus=given.bulk_modulus_kpa * 1e3)
+    tip = given.tip_radius_mm * 1e-3
     mass = None if given.mass_mg is None else given.mass_mg * 1e-6
     nominal = dust == Dust() and mass is None and not given.sphere
-    print(f"{dust}, tip radius {given.tip_radius_mm:g} mm")
-    for number, (speed, cells) in enumerate((v, c) for v in given.speed for c in given.cells):
-        numerics = Numerics(
-            cells=cells, growth=given.growth, even=given.even, width=given.width, depth=given.depth,
-            courant=given.courant, linear=given.linear, hourglass=given.hourglass,
-        )  # fmt: skip
-        began = time.process_time()
-        try:
-            found = run_drop(dust, radius, speed, numerics, mass, given.sphere)
-        except RuntimeError as error:
-            print(f"| {speed:g} | {cells:g} | {error} |")
-            continue
-        seconds = time.process_time() - began
-        places = (x.ravel() for x in (found.r, found.z, found.volume, found.phi))
-        figures = measure_tip(*places, found.stopping_depth, radius, radius / cells)
-        limits = find_limits(given.tip_radius_mm, speed) if nominal else None
-        off = [""] * 2 if limits is None else [
-            f" ({100 * (mine / limit - 1):+.2f} %)"
-            for mine, limit in zip((found.stopping_depth * 1e3, found.stopping_time * 1e3), limits, strict=True)
-        ]  # fmt: skip
-        shares = {
-            name: 100 * found.energies[name] / found.energies["kinetic at contact"]
-            for name in ("plastic", "elastic", "viscous", "hourglass", "contact")
-        }
-        if number == 0:
-            heads = [
-                "v m/s",
-                "a/dx",
-                "D mm",
-                "T_s ms",
-                "D(T_s/2)/D",
-                *figures,
-                *shares,
-                "energy error %",
-                "cells",
-                "steps",
-                "CPU s",
-            ]
-            print("| " + " | ".join(heads) + " |\n|" + " --- |" * len(heads))
-        half = np.interp(0.5 * found.stopping_time, found.time, found.depth) / found.stopping_depth
-        row = [
-            f"{speed:g}", f"{cells:g}", f"{found.stopping_depth * 1e3:.4f}{off[0]}", f"{found.stopping_time * 1e3:.3f}{off[1]}",
-            f"{half:.3f}", *(f"{x:.3f}" for x in figures.values()), *(f"{x:.1f}" for x in shares.values()),
-            f"{100 * found.energy_error:+.2f}", str(found.phi.size), str(found.steps), f"{seconds:.2f}",
-        ]  # fmt: skip
-        print("| " + " | ".join(row) + " |", flush=True)
+    run_drop(dust, tip, 0.1, Numerics(cells=3.0))  # compiles
+    columns = {}
+    for speed in given.speed:
+        for cells in given.cells:
+            numerics = Numerics(
+                cells, given.growth, given.even, given.width, given.depth, given.courant, given.linear,
+                given.quadratic, given.hourglass,
+            )  # fmt: skip
+            began = time.process_time()
+            try:
+                found = run_drop(dust, tip, speed, numerics, mass, given.sphere)
+            except RuntimeError as error:
+                print(f"{speed:g} m/s, a/dx {cells:g}: {error}")
+                continue
+            limits = find_limits(given.tip_radius_mm, speed) if nominal else None
+            seconds = time.process_time() - began
+            columns[f"{speed:g} m/s, a/dx {cells:g}"] = describe(found, seconds, tip, cells, limits)
+    print(
+        f"tip radius {given.tip_radius_mm:g} mm, p_m {dust.p_m:g} Pa, K0 {dust.bulk_modulus * 1e-3:g} kPa; ",
+        end="",
+    )
+    print(
+        "in brackets % from the limit of the independent solver; energies in % of the kinetic one at contact\n"
+    )
+    print_table(columns)
 
 
 if __name__ == "__main__":

@@ -40,3 +40,11 @@ def measure_tip(
         found[f"{name} mean"] = float((volume * phi)[layer].sum() / held) if held else np.nan
         found[f"{name} max"] = float(phi[layer].max()) if held else np.nan
     return found
+
+
+def print_table(columns: dict[str, dict[str, str]]) -> None:
+    """Markdown, a column for each entry and a row for each figure."""
+    if columns:
+        print("| | " + " | ".join(columns) + " |\n|" + " --- |" * (len(columns) + 1))
+        for name in next(iter(columns.values())):
+            print(f"| {name} | " + " | ".join(column.get(name, "") for column in columns.values()) + " |")
