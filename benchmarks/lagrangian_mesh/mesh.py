@@ -136,8 +136,7 @@ def run_drop(
     )
     if steps < 0:
         raise RuntimeError(
-            f"the mesh tangled {-curve[-steps, 1] / radius:.2f} tip radii deep, at {-curve[-steps, 2]:.2f} m/s; "
-            "it serves to about 1.5 radii"
+            f"the mesh tangled {-curve[-steps, 1] / radius:.2f} tip radii deep; it serves to about 1.5 radii"
         )
     curve = curve[: steps + 1].copy()
     clock, height, velocity, force = curve.T

@@ -1,0 +1,140 @@
+"""The Lagrangian mesh of benchmarks/ against closed forms, and one drop against the independent material points."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "lagrangian_mesh"))
+import mesh
+import quadrilateral
+from cavity import grow_cavity, solve_cavity
+from drop import find_limits
+from tip import measure_tip
+
+RADIUS = 0.5e-3
+DAMPING = np.array([0.02, 1.2, 0.1])
+
+
+def lay_dented_mesh(radius):
+    """12 × 10 cells under a hemispherical dent whose edge is at the 8th node, sheared and uneven inside."""
+    r, depth = np.meshgrid(radius / 8.0 * np.arange(13), radius / 8.0 * np.arange(11.0) ** 1.1, indexing="ij")
+    z = -depth - np.sqrt(np.maximum(radius**2 - r**2, 0.0)) * (1.0 - depth / depth.max())
+    return r, z
+
+
+def load(r, z, cells, dust, u, v, dt):
+    force_r, force_z, spent = np.zeros_like(r), np.zeros_like(r), np.zeros(3)
+    quadrilateral.load_nodes(r, z, u, v, dt, cells, dust.law, DAMPING, force_r, force_z, spent)
+    return force_r, force_z, spent
+
+
+def test_pressure_on_a_curved_surface_is_pressure_times_its_cross_section():
+    dust = mesh.Dust(p_m=1e6)
+    r, z = lay_dented_mesh(RADIUS)
+    cells = mesh.lay_mesh(r, z, dust, 0.0)
+    pressure = 20.0
+    cells[..., quadrilateral.PHI0] = quadrilateral.find_unstressed(0.15, pressure, dust.bulk_modulus)
+    _, force, _ = load(r, z, cells, dust, np.zeros_like(r), np.zeros_like(r), 0.0)
+    width = RADIUS / 8.0
+    # the node at the dent's edge carries half of the ring on either side
+    inside = force[:8, 0].sum() + pressure * 0.5 * width * (RADIUS - 0.5 * width)
+    assert inside == pytest.approx(pressure * 0.5 * RADIUS**2, rel=0.01)
+    assert force[:, 0].sum() == pytest.approx(pressure * 0.5 * r[-1, 0] ** 2, rel=1e-12)
+    assert np.abs(force.sum()) < 1e-12 * np.abs(force).sum()
+
+
+def test_uniform_pressure_loads_no_inner_node():
+    """Hoop stress and the growing rings balance: each half of it alone would load a node as much as the pressure does."""
+    dust = mesh.Dust(p_m=1e6)
+    edges = mesh.grade(1.5 * RADIUS, 3.0 * RADIUS, RADIUS / 8.0, 1.12)
+    r, z = np.meshgrid(edges, -edges, indexing="ij")
+    cells = mesh.lay_mesh(r, z, dust, 0.0)
+    cells[..., quadrilateral.PHI0] = quadrilateral.find_unstressed(0.15, 20.0, dust.bulk_modulus)
+    radial, axial, _ = load(r, z, cells, dust, np.zeros_like(r), np.zeros_like(r), 0.0)
+    assert np.abs(radial[1:-1]).max() < 1e-12 * np.abs(radial[-1]).max()
+    assert np.abs(axial[:, 1:-1]).max() < 1e-12 * np.abs(axial[:, 0]).max()
+
+
+def test_swelling_is_pure_pressure():
+    """v = α x strains by α in all three directions, hoops included."""
+    dust = mesh.Dust(p_m=1e9, tensile_factor=1e6)
+    r, z = lay_dented_mesh(RADIUS)
+    cells = mesh.lay_mesh(r, z, dust, 0.0)
+    strain = 1e-3
+    load((1 + strain) * r, (1 + strain) * z, cells, dust, strain * r, strain * z, 1.0)
+    exact = dust.bulk_modulus * ((1 + strain) ** -3 - 1)
+    assert cells[..., quadrilateral.PRESSURE] == pytest.approx(exact, rel=1e-9)
+    assert np.abs(cells[..., quadrilateral.SRR : quadrilateral.SRZ + 1]).max() < 1e-9 * abs(exact)
+
+
+def test_rigid_sphere_on_elastic_dust():
+    """Hertz: (15 m v² / (16 E* √a))^(2/5) deep after 1.4716 depth/v; what is left of the energy is elastic."""
+    dust = mesh.Dust(p_m=1e9, tensile_factor=1e6, bulk_modulus=300e3)
+    speed = 0.05
+    young, poisson = 9 * 0.5 / 3.5 * dust.bulk_modulus, 2 / 7  # of μ = K/2
+    mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * RADIUS**3
+    depth = (15 * mass * speed**2 * (1 - poisson**2) / (16 * young * math.sqrt(RADIUS))) ** 0.4
+    run = mesh.run_drop(dust, RADIUS, speed, mesh.Numerics(quadratic=0.0), gravity=0.0)
+    assert run.stopping_depth == pytest.approx(depth, rel=0.02)
+    assert run.stopping_time == pytest.approx(1.4716 * depth / speed, rel=0.03)
+    assert run.energies["elastic"] > 0.98 * run.energies["kinetic at contact"]
+
+
+def test_cavity_in_yielding_dust():
+    """Grown 2.5-fold from a finite radius, it is 3 % short of the pressure that it bears when grown from nothing."""
+    dust = mesh.Dust()
+    exact, xi, phi = solve_cavity(dust)
+    _, pressure, places, found = grow_cavity(dust, growth=2.5, speed=0.1, layers=36, sectors=6, outer=15.0)
+    assert 0.96 * exact < np.mean(pressure[-50:]) < exact
+    near = places < 1.5
+    assert found[near] == pytest.approx(np.interp(places[near], xi, phi), rel=0.012)
+
+
+def test_cavity_in_a_metal():
+    """Without compaction the exact answer has a closed form, (2Y/3)(1 + ln(E/(3(1 - ν)Y))); Hill (1950), ch. V."""
+    dust = mesh.Dust(p_m=1e9, shear_factor=1e-3, tensile_factor=0.5, bulk_modulus=3e6)
+    compressive, tensile = quadrilateral.find_strengths(0.15, dust.law)
+    strength = dust.shear_factor * math.sqrt(compressive * tensile)
+    young, poisson = 9 * 0.5 / 3.5 * dust.bulk_modulus, 2 / 7
+    closed = 2 / 3 * strength * (1 + math.log(young / (3 * (1 - poisson) * strength)))
+    assert solve_cavity(dust)[0] == pytest.approx(closed, rel=0.03)
+
+
+@pytest.fixture(scope="module")
+def drop():
+    return mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
+
+
+def test_drop_stops_where_the_material_points_stop(drop):
+    depth, stop = find_limits(0.5, 0.30)
+    assert drop.stopping_depth * 1e3 == pytest.approx(depth, rel=0.015)
+    assert drop.stopping_time * 1e3 == pytest.approx(stop, rel=0.015)
+
+
+def test_energy_is_booked(drop):
+    assert abs(drop.energy_error) < 1e-3
+    at_contact = drop.energies["kinetic at contact"]
+    for sink in ("viscous", "hourglass", "contact"):
+        assert 0.0 < drop.energies[sink] < 0.015 * at_contact
+    assert drop.energies["plastic"] > 0.95 * at_contact
+
+
+def test_dust_at_the_tip(drop):
+    """The dense dust hardly depends on the mesh: the same volumes to 4 % with cells half as wide."""
+    figures = []
+    fine = mesh.run_drop(mesh.Dust(), RADIUS, 0.30, mesh.Numerics(cells=14.0))
+    for run, cells in ((drop, 8.0), (fine, 14.0)):
+        places = (x.ravel() for x in (run.r, run.z, run.volume, run.phi))
+        figures.append(measure_tip(*places, run.stopping_depth, RADIUS, RADIUS / cells))
+    coarse, better = figures
+    assert coarse["V(>0.20)"] == pytest.approx(better["V(>0.20)"], rel=0.05)
+    assert coarse["max"] == pytest.approx(better["max"], abs=0.01)
+    assert better["max"] < 0.26
+
+
+def test_what_tangles_says_so():
+    with pytest.raises(RuntimeError, match="tangled"):
+        mesh.run_drop(mesh.Dust(p_m=300.0), RADIUS, 1.5, mesh.Numerics(cells=5.0, depth=9.0))
