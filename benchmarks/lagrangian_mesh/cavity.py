@@ -5,7 +5,8 @@ yields, √(3 J2) = |σ_r - σ_θ| = Y(φ) and p = p(φ), the elastic line and t
 
     equilibrium  d(p + 2Y/3)/d ln ξ = -2 Y      continuity  (V - ξ) dφ/dξ = -φ (dV/dξ + 2 V/ξ)
 
-inwards from where the elastic dust beyond begins to yield, V = ξ Y/(2μ), to the wall, V = ξ. Bishop, Hill & Mott (1945); with compaction the same.
+inwards from where the elastic dust beyond begins to yield, V = ξ Y/(2μ), to the wall, V = ξ. Bishop, Hill & Mott (1945)
+have it for metals, which do not compact.
 """
 
 from __future__ import annotations
