@@ -48,7 +48,7 @@ def solve_cavity(dust: Dust) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def grow_cavity(
-    dust: Dust, growth: float, speed: float = 0.02, layers: int = 60, sectors: int = 8, outer: float = 30.0
+    dust: Dust, growth: float, speed: float = 0.05, layers: int = 48, sectors: int = 6, outer: float = 40.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Grow a cavity from radius 1 mm by the factor ``growth`` at ``speed`` (m/s), in a shell fixed at ``outer`` mm.
 
@@ -71,8 +71,10 @@ def grow_cavity(
         if crossing < 0.0:
             raise RuntimeError("a cell turned over")
         walls.append(radius)
-        # half a sphere; its wall bears what it passes on to the dust
-        pressures.append(-2.0 * np.sum(force_r[:, 0] * out_r + force_z[:, 0] * out_z) / (2.0 * radius**2))
+        # by virtual work: the wall's chords, pushed along the radii of their ends
+        chords = 0.5 * (r[:-1, 0] + r[1:, 0]) * np.hypot(np.diff(r[:, 0]), np.diff(z[:, 0]))
+        area = chords.sum() * np.cos(0.5 * angles[1])
+        pressures.append(-np.sum(force_r[:, 0] * out_r + force_z[:, 0] * out_z) / area)
         dt = 0.5 * crossing
         u += dt * force_r / nodes
         v += dt * force_z / nodes

@@ -84,11 +84,11 @@ def test_rigid_sphere_on_elastic_dust():
 
 
 def test_cavity_in_yielding_dust():
-    """Grown 2.5-fold from a finite radius, it is 3 % short of the pressure that it bears when grown from nothing."""
+    """Grown 2.5-fold from a finite radius, it is 2 % short of the pressure that it bears when grown from nothing."""
     dust = mesh.Dust()
     exact, xi, phi = solve_cavity(dust)
-    _, pressure, places, found = grow_cavity(dust, growth=2.5, speed=0.1, layers=36, sectors=6, outer=15.0)
-    assert 0.96 * exact < np.mean(pressure[-50:]) < exact
+    _, pressure, places, found = grow_cavity(dust, growth=2.5, speed=0.1, layers=36, sectors=4)
+    assert 0.97 * exact < np.mean(pressure[-50:]) < exact
     near = places < 1.5
     assert found[near] == pytest.approx(np.interp(places[near], xi, phi), rel=0.012)
 
@@ -100,7 +100,7 @@ def test_cavity_in_a_metal():
     strength = dust.shear_factor * math.sqrt(compressive * tensile)
     young, poisson = 9 * 0.5 / 3.5 * dust.bulk_modulus, 2 / 7
     closed = 2 / 3 * strength * (1 + math.log(young / (3 * (1 - poisson) * strength)))
-    assert solve_cavity(dust)[0] == pytest.approx(closed, rel=0.03)
+    assert solve_cavity(dust)[0] == pytest.approx(closed, rel=0.002)
 
 
 @pytest.fixture(scope="module")
