@@ -28,11 +28,11 @@ from scipy.spatial import cKDTree
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
 
-HERE = Path(__file__).parent
-sys.path += [str(HERE / "material_points"), str(HERE / "lagrangian_mesh")]
-import drop as material_points  # noqa: E402
-import mesh  # noqa: E402
-from tip import measure_tip, print_table  # noqa: E402
+sys.path.append(str(Path(__file__).parent / "material_points"))
+sys.path.append(str(Path(__file__).parent / "lagrangian_mesh"))
+import drop as material_points
+import mesh
+from tip import measure_tip, print_table
 
 COLOURS = (0.15, 0.30)  # φ at the ends of the scale
 PIXEL = 0.05  # of a spacing

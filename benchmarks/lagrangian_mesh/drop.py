@@ -72,10 +72,11 @@ def main() -> None:
     parser.add_argument("--cells", type=numbers, default=[8.0], help="in a tip radius")
     parser.add_argument("--p-m", type=float, default=Dust.p_m, help="Pa")
     parser.add_argument("--bulk-modulus-kpa", type=float, default=Dust.bulk_modulus * 1e-3)
+    parser.add_argument("--gas-kpa", type=float, default=0.0, help="trapped in the pores")
     for choice in ("growth", "even", "width", "depth", "courant", "linear", "quadratic", "hourglass"):
         parser.add_argument(f"--{choice}", type=float, default=getattr(Numerics, choice))
     given = parser.parse_args()
-    dust = Dust(p_m=given.p_m, bulk_modulus=given.bulk_modulus_kpa * 1e3)
+    dust = Dust(p_m=given.p_m, bulk_modulus=given.bulk_modulus_kpa * 1e3, gas_pressure=given.gas_kpa * 1e3)
     tip = given.tip_radius_mm * 1e-3
     mass = None if given.mass_mg is None else given.mass_mg * 1e-6
     nominal = dust == Dust() and mass is None and not given.sphere

@@ -22,6 +22,7 @@ class Dust:
     shear_factor: float = 1.0
     tensile_factor: float = 1.0
     solid: float = 2000.0
+    gas_pressure: float = 0.0  # of the gas that the pores hold and keep
 
     @property
     def law(self) -> np.ndarray:
@@ -30,6 +31,7 @@ class Dust:
             [
                 self.p_m, self.phi_1, self.phi_2, self.delta * np.log(10.0), self.bulk_modulus,
                 self.shear_to_bulk, self.shear_factor, self.tensile_factor, self.solid,
+                self.gas_pressure, self.filling_factor,
             ]
         )  # fmt: skip
 
@@ -111,6 +113,14 @@ def find_elastic_energy(cells: np.ndarray, dust: Dust) -> float:
     return float(np.sum((volumetric + shear) * cells[..., quadrilateral.VOLUME]))
 
 
+def find_gas_energy(cells: np.ndarray, dust: Dust) -> float:
+    """Per radian: ∫ (P - P0) dV of the gas at one temperature, from its volume at the start to that now."""
+    phi = cells[..., quadrilateral.PHI]
+    start, now = 1.0 / dust.filling_factor - 1.0, 1.0 / phi - 1.0  # per volume of grains
+    energy = dust.gas_pressure * (start * np.log(start / now) - start + now)
+    return float(np.sum(energy * phi * cells[..., quadrilateral.VOLUME]))
+
+
 def run_drop(
     dust: Dust,
     radius: float,
@@ -144,12 +154,14 @@ def run_drop(
         raise RuntimeError(f"no stop within {clock[-1] * 1e3:.3g} ms")
     back = velocity[-1] / (velocity[-1] - velocity[-2]) * (clock[-1] - clock[-2])
     elastic = find_elastic_energy(cells, dust) - elastic
+    gas = find_gas_energy(cells, dust)
     energies = {
         "kinetic at contact": 0.5 * mass * speed**2,
         "gravity": -mass * gravity * height[-1] - 2 * np.pi * spent[5],
         "kinetic": 2 * np.pi * spent[4] + 0.5 * mass * velocity[-1] ** 2,
         "elastic": 2 * np.pi * elastic,
-        "plastic": 2 * np.pi * (spent[0] - elastic),
+        "gas": 2 * np.pi * gas,
+        "plastic": 2 * np.pi * (spent[0] - elastic - gas),
         "viscous": 2 * np.pi * spent[1],
         "hourglass": 2 * np.pi * spent[2],
         "contact": 2 * np.pi * spent[3],

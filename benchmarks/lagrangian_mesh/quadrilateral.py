@@ -24,7 +24,8 @@ REFERENCE = 0.15  # φ at which the bulk modulus is stated
 
 @njit(inline="always")
 def find_strengths(phi, law):
-    """Σ and |T| in Pa at φ. law: p_m, φ1, φ2, Δ ln 10, K0, μ/K, shear factor, tensile factor, solid density."""
+    """Σ and |T| in Pa at φ. law: p_m, φ1, φ2, Δ ln 10, K0, μ/K, shear factor, tensile factor, solid density, gas pressure, φ at
+    the start."""
     p_m, phi_1, phi_2, exponent = law[:4]
     inside = min(max(phi, phi_1 + EDGE), phi_2 - EDGE)
     compressive = p_m * ((inside - phi_1) / (phi_2 - inside)) ** exponent
@@ -54,7 +55,7 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
     cells : (n, m, 8); damping : linear and quadratic bulk viscosity, hourglass
     spent : (3,), added to. Returns the shortest time (s) in which sound crosses a cell, or -1 where a cell has turned over.
     """
-    k0, shear_to_bulk, shear_factor, solid = law[4], law[5], law[6], law[8]
+    k0, shear_to_bulk, shear_factor, solid, gas, phi_start = law[4], law[5], law[6], law[8], law[9], law[10]
     linear, quadratic, hourglass = damping
     force_r[:] = 0.0
     force_z[:] = 0.0
@@ -96,6 +97,8 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
                 phi0 = find_unstressed(phi, pressure, k0)
             bulk = k0 * (phi0 / REFERENCE) ** 4
             mu = shear_to_bulk * bulk
+            # gas that cannot leave the pores, at one temperature
+            pressure += gas * (phi - phi_start) / (1.0 - phi)
             # deviatoric stress: Jaumann's rate, then back along the radius to von Mises' surface
             spin, shear = 0.5 * (lrz - lzr), 0.5 * (lrz + lzr)
             err, ezz, ett = lrr - div / 3.0, lzz - div / 3.0, hoop - div / 3.0
@@ -116,7 +119,8 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
             cell[SRR], cell[SZZ], cell[SRZ] = srr, szz, srz
             # bulk viscosity, on compression
             rho = phi * solid
-            sound = math.sqrt((bulk * phi / phi0 + 4.0 / 3.0 * mu) / rho)
+            stiffness = bulk * phi / phi0 + 4.0 / 3.0 * mu + gas * phi * (1.0 - phi_start) / (1.0 - phi) ** 2
+            sound = math.sqrt(stiffness / rho)
             length = math.sqrt(area)
             viscous = rho * length * (quadratic * length * div - linear * sound) * min(div, 0.0)
             spent[VISCOUS] -= viscous * div * dt * middle

@@ -58,14 +58,16 @@ def test_uniform_pressure_loads_no_inner_node():
     assert np.abs(axial[:, 1:-1]).max() < 1e-12 * np.abs(axial[:, 0]).max()
 
 
-def test_swelling_is_pure_pressure():
-    """v = α x strains by α in all three directions, hoops included."""
-    dust = mesh.Dust(p_m=1e9, tensile_factor=1e6)
+@pytest.mark.parametrize("gas", [0.0, 1e5])
+def test_swelling_is_pure_pressure(gas):
+    """v = α x strains by α in all three directions, hoops included; trapped gas adds P0 ((1 - φi)/(1 - φ) - 1)."""
+    dust = mesh.Dust(p_m=1e9, tensile_factor=1e6, gas_pressure=gas)
     r, z = lay_dented_mesh(RADIUS)
     cells = mesh.lay_mesh(r, z, dust, 0.0)
     strain = 1e-3
     load((1 + strain) * r, (1 + strain) * z, cells, dust, strain * r, strain * z, 1.0)
-    exact = dust.bulk_modulus * ((1 + strain) ** -3 - 1)
+    thinned = (1 + strain) ** -3
+    exact = dust.bulk_modulus * (thinned - 1) + gas * (0.85 / (1 - 0.15 * thinned) - 1)
     assert cells[..., quadrilateral.PRESSURE] == pytest.approx(exact, rel=1e-9)
     assert np.abs(cells[..., quadrilateral.SRR : quadrilateral.SRZ + 1]).max() < 1e-9 * abs(exact)
 
@@ -120,6 +122,12 @@ def test_energy_is_booked(drop):
     for sink in ("viscous", "hourglass", "contact"):
         assert 0.0 < drop.energies[sink] < 0.015 * at_contact
     assert drop.energies["plastic"] > 0.95 * at_contact
+
+
+def test_energy_of_trapped_gas_is_booked():
+    run = mesh.run_drop(mesh.Dust(gas_pressure=5e3), RADIUS, 0.30)
+    assert abs(run.energy_error) < 1e-3
+    assert run.energies["gas"] > 0.2 * run.energies["kinetic at contact"]
 
 
 def test_dust_at_the_tip(drop):
