@@ -38,7 +38,7 @@ def extend_edge(opacity: FloatArray, plateau: float) -> FloatArray:
     if found is None:
         return opacity
     offset, blur, _, full = found
-    drawn = full * ndtr((_measure_distance(opacity)[0] - offset) / blur)
+    drawn = full * ndtr((measure_distance(opacity)[0] - offset) / blur)
     return np.where(opacity < plateau + ABOVE_PLATEAU, drawn, opacity)
 
 
@@ -46,7 +46,7 @@ def _fit_edge(
     opacity: FloatArray, known_above: float, free_base: bool
 ) -> tuple[float, float, float, float] | None:
     """Offset from the contour, blur (px), opacity of the background and of the projectile of one edge profile."""
-    distance, count = _measure_distance(opacity)
+    distance, count = measure_distance(opacity)
     if count < 12:
         return None
     near = (np.abs(distance) < ACROSS) & (opacity > known_above)
@@ -68,7 +68,7 @@ def _fit_edge(
     return float(q[0]), float(q[1]), float(q[3]) if free_base else 0.0, float(q[2])
 
 
-def _measure_distance(opacity: FloatArray) -> tuple[FloatArray, int]:
+def measure_distance(opacity: FloatArray) -> tuple[FloatArray, int]:
     """Signed distance (px, positive inside) of every pixel from the contour, and the number of its points."""
     slope = np.stack(np.gradient(opacity), axis=-1)
     points, normals = [], []

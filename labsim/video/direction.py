@@ -45,7 +45,8 @@ def check_direction(frames: Frames, outlines: tuple[list[Outline | None], float,
         raise MeasurementError(
             frames.path,
             "video",
-            "the projectile moves upwards; give --rotate 180 if the picture is upside down",
+            "the largest thing that moves goes upwards: a shadow, a hand or thrown-up dust, or the picture is upside down "
+            "(--rotate 180); use only the frames with the projectile alone (--frames)",
         )
 
 

@@ -65,7 +65,7 @@ def build_template(
             opacity = _fill_nearest(opacity, weight > 0)
         if turn == 0 and np.isfinite(scene.limit):
             opacity = extend_edge(opacity, scene.plateau)
-        template = Template(opacity, top, left)
+        template = Template(opacity, top, left, weight > 0)
         if turn == PASSES - 1:
             break
         renewed = []
@@ -112,7 +112,7 @@ def find_tip_point(
     Under a saturated background only what is darker was recorded (opacity ``known_above``) and counts. None where the end
     is not round.
     """
-    m = template.opacity if lower else template.opacity[::-1]
+    m, known = (a if lower else a[::-1] for a in (template.opacity, template.known))
     h, w = m.shape
     rows = np.arange(h, dtype=float)
     columns = np.arange(w, dtype=float)
@@ -134,7 +134,7 @@ def find_tip_point(
         distance = np.hypot(yy - q[0], xx - q[1])
         angle = np.abs(np.arctan2(xx - q[1], yy - q[0]))
         near = (angle < np.pi / 3) & (np.abs(distance - q[2]) < 7.0)
-        near &= m > known_above
+        near &= known & (m > known_above)
         if near.sum() < 40:
             return None
         found = least_squares(

@@ -10,6 +10,9 @@ from .following import EndTrack, Progress
 from .frames import Frames
 from .scene import Scene
 
+LEAST_CHANGE = 0.03  # px of the rod's length
+STEADY = 8.0  # standard errors of a slope
+
 
 def clip_gap(gap: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Leave out distances between the ends that lie far from the others."""
@@ -67,8 +70,6 @@ def compare_with_edge(
     """Second estimate by the erf edge; frames that disagree by far are rejected. Returns the rms difference."""
     count = len(row)
     difference, error = np.full(count, np.nan), np.full(count, np.nan)
-    bright = float(scene.noise.variance(np.array(scene.projectile_level + scene.contrast)))
-    dark = float(scene.noise.variance(np.array(scene.projectile_level)))
     for i, picture in enumerate(frames):
         if np.isfinite(top.y[i]):
             second = fit_edge(
@@ -76,7 +77,7 @@ def compare_with_edge(
                 scene.background,
                 usable,
                 edge,
-                (bright, dark),
+                scene.edge_noise,
                 float(top.y[i]),
                 float(top.x[i]),
                 scene.projectile_level * float(scene.brightness[i]),
@@ -109,6 +110,31 @@ def compare_lengths(gap: FloatArray, variance: FloatArray) -> float:
     if len(gap) < 12:
         return 1.0
     return max(1.0, float(np.std(gap, ddof=1) / np.sqrt(np.mean(variance))))
+
+
+def describe_length(row: FloatArray, gap: FloatArray, variance: FloatArray) -> str | None:
+    """A warning where the distance between the ends of a rigid rod is not one number, else None.
+
+    row, gap : (n,) of the tip and of the distance; variance : of the distances that were kept.
+    """
+    spread = max(1.4826 * float(np.median(np.abs(gap - np.median(gap)))), 0.005)
+    keep = np.abs(gap - np.median(gap)) < 4 * spread
+    if keep.sum() < 8:
+        return None
+    row, gap = row[keep] - np.mean(row[keep]), gap[keep]
+    noise = float(np.sqrt(np.median(variance)))
+    scatter = float(np.std(gap))
+    slope = float(np.sum(row * gap) / np.sum(row**2))
+    left = float(np.std(gap - slope * row))
+    change, path = slope * float(np.ptp(row)), float(np.ptp(row))
+    if abs(change) > LEAST_CHANGE and abs(slope) > STEADY * left / np.sqrt(np.sum(row**2)):
+        return (
+            f"the rod gets {abs(change):.2f} px {'longer' if change > 0 else 'shorter'} while it falls through {path:.0f} px: lens "
+            "distortion, a fall out of the plane, focus, or a shutter that reads row after row; scale and rows change with it"
+        )
+    if scatter > max(LEAST_CHANGE, 3 * noise):
+        return f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane, or pass dirt?"
+    return None
 
 
 def raise_to_scatter(

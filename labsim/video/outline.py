@@ -10,10 +10,13 @@ import numpy as np
 from ..records import FloatArray
 from .scene import Scene
 
+CUT_SHARE = 0.3  # of a body's rows that reach the picture's edge; flying dust that touches both reaches it in a few
+
 
 @dataclass(frozen=True)
 class Outline:
-    """Ends and widths of the visible part (px). top is None above the picture, tip None in the dust or below it."""
+    """Ends and widths of the visible part (px). top is None above the picture, tip None in the dust or below it; cut says
+    whether the picture's left or right edge goes through it."""
 
     top: float | None
     tip: float | None
@@ -21,6 +24,7 @@ class Outline:
     column_tip: float
     width: float
     tip_width: float
+    cut: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,8 @@ class Outliner:
         floor = self.floor[np.clip(under, 0, len(self.floor) - 1)]
         visible_tip = tip_row < floor - 1
         lower = widths[max(0, bh - reach) :]
+        beside = [body[:, 0]] if x0 + self.left == 0 else []
+        beside += [body[:, -1]] if x0 + bw + self.left == picture.shape[1] else []
         return Outline(
             top=float(top_row) - 0.5 if top_row > 1 else None,
             tip=float(tip_row) + 0.5 if visible_tip else None,
@@ -102,6 +108,7 @@ class Outliner:
             column_tip=column_tip,
             width=float(np.median(widths[solid])),
             tip_width=float(lower.max()) if lower.size else typical,
+            cut=any(np.mean(edge) > CUT_SHARE for edge in beside),
         )
 
     def find_bodies(self, picture: np.ndarray, brightness: float, share: float = 0.3) -> list[Body]:

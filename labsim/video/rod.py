@@ -10,12 +10,15 @@ from ..errors import MeasurementError
 from ..records import FloatArray, Measured
 from .clipping import ABOVE_PLATEAU
 from .ends import find_edge, find_tip_point, measure_shaft
-from .following import Progress, follow_end, follow_entering, restore_light
+from .fields import compare_fields
+from .following import EndTrack, Progress, follow_end, follow_entering, restore_light
 from .frames import Frames
-from .joining import clip_gap, compare_lengths, compare_with_edge, join_ends, raise_to_scatter
+from .joining import clip_gap, compare_lengths, compare_with_edge, describe_length, join_ends, raise_to_scatter
 from .lossy import measure_widening, widen_for_hidden
 from .outline import Outline
+from .response import describe_response, find_gamma
 from .scene import Scene
+from .steadiness import Movement
 from .template import MARGIN
 
 LOSSY_TAILS = 8.0  # codecs treat frames of several kinds by turns: the worse kind is no accident
@@ -46,12 +49,14 @@ def follow_rod(
     scene: Scene,
     usable: np.ndarray,
     outlines: tuple[list[Outline | None], float, float],
+    movement: Movement | None,
     warnings: list[str],
     progress: Progress | None,
     *,
     clipped: bool = False,
 ) -> Positions:
-    """Follow both ends and join them; ``clipped``: the background is saturated.
+    """Follow both ends and join them; ``clipped``: the background is saturated; rows are measured against a ``movement``
+    of the dust.
 
     Raises MeasurementError where the tip is never seen free.
     """
@@ -66,6 +71,9 @@ def follow_rod(
             "video",
             "the tip is never seen free of the dust and the picture's edge; begin earlier or frame it wider",
         )
+    if not (frames.lossy or clipped):
+        said = describe_response([_find_gamma(scene, usable, end) for end in (tip, top) if end is not None])
+        warnings += [] if said is None else [said]
     first_sigma, tails = tip.sigma, 4.0  # what the pixels alone promise
     if frames.lossy:
         tails = LOSSY_TAILS
@@ -82,7 +90,13 @@ def follow_rod(
         tip_offset, tip_radius = float(rows[-1]) + 0.5 + tip.template.top, None
     else:
         tip_offset, tip_radius = round_end[0] + round_end[2], round_end[2]
-    tip = replace(tip, sigma=raise_to_scatter(tip.y, tip.sigma, "the tip", aside, tails))
+    moved, unsteady = (0.0, 0.0) if movement is None else (movement.choose(tip.y), movement.sigma)
+
+    def raise_error(end: EndTrack, sigma: FloatArray, what: str) -> FloatArray:
+        known = np.hypot(sigma, unsteady)
+        return sigma * raise_to_scatter(end.y - moved, known, what, aside, tails) / known
+
+    tip = replace(tip, sigma=raise_error(tip, tip.sigma, "the tip"))
     tip_y, tip_x = tip.y + tip_offset, tip.x
     tip_sigma = tip.sigma.copy()
     row, sigma, x = tip_y.copy(), tip_sigma.copy(), tip_x.copy()
@@ -90,7 +104,7 @@ def follow_rod(
     top_row = np.full(count, np.nan)
     length = edge_rms = tilt = diameter = None
     if top is not None:
-        top = replace(top, sigma=raise_to_scatter(top.y, top.sigma, "the top end", aside, tails))
+        top = replace(top, sigma=raise_error(top, top.sigma, "the top end"))
         shaft = measure_shaft(top.template)
         if shaft is not None:
             tilt, diameter = shaft[0], Measured(shaft[1], shaft[2])
@@ -110,18 +124,21 @@ def follow_rod(
             gap, variance = clip_gap(gap, variance)
             reach = float(np.sum(gap / variance) / np.sum(1 / variance))
             doubt = float(np.sqrt(1 / np.sum(1 / variance)))
-            scatter = float(np.std(gap)) if len(gap) > 2 else 0.0
+            changes = describe_length(tip_y[both], tip_y[both] - top.y[both], variance)
+            if changes is not None:
+                warnings.append(changes)
+                # what changes the length goes on where the tip is hidden
+                doubt = float(np.hypot(doubt, np.std(gap)))
+                longer = compare_lengths(gap, variance)
+                tip_sigma, top = longer * tip_sigma, replace(top, sigma=longer * top.sigma)
+                tip = replace(tip, sigma=longer * tip.sigma)
             length = Measured(reach - offset, doubt)
-            if scatter > max(0.03, 3 * float(np.sqrt(np.median(variance)))):
-                warnings.append(
-                    f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane?"
-                )
             side = float(np.median((tip_x - top.x)[both]))
             entering = follow_entering(frames, scene, usable, tip, top, reach - tip_offset, side)
             tip_y = np.where(np.isfinite(entering.y), entering.y + tip_offset, tip_y)
             tip_x = np.where(np.isfinite(entering.y), entering.x, tip_x)
             ratio = float(np.nanmedian(tip.sigma / first_sigma))
-            own = raise_to_scatter(entering.y, entering.sigma * ratio, "the half-buried tip", aside, tails)
+            own = raise_error(entering, entering.sigma * ratio, "the half-buried tip")
             tip_sigma = np.where(np.isfinite(entering.y), own, tip_sigma)
             lowest = top.template.top + top.template.opacity.shape[0] - MARGIN
             shared = reach - tip_offset + tip.template.top + MARGIN < lowest
@@ -136,6 +153,8 @@ def follow_rod(
                 r or ("" if np.isfinite(v) else "tip in the dust") for r, v in zip(reason, row, strict=True)
             ]
         if edge is not None:
+            fields = compare_fields(frames, scene, usable, top, edge, scene.edge_noise)
+            warnings += [] if fields is None else [fields]
             edge_rms = compare_with_edge(
                 frames, scene, usable, top, edge, row, sigma, reason, warnings, progress
             )
@@ -151,4 +170,10 @@ def follow_rod(
             if raised >= 1.05
             else f"compressed with loss ({frames.codec.upper()}): no error bar had to be raised for {cause}"
         )
-    return Positions(row, sigma, x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)
+    return Positions(row - moved, np.hypot(sigma, unsteady), x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)
+
+
+def _find_gamma(scene: Scene, usable: np.ndarray, end: EndTrack) -> tuple[float, float, float] | None:
+    path = scene.swept & usable
+    light = float(np.median(scene.background[path if path.any() else usable]))
+    return find_gamma(end.template, scene.projectile_level, light)

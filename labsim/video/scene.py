@@ -53,6 +53,13 @@ class Scene:
         full = float(np.max(self.background))
         return (full - self.ceiling) / (full - self.projectile_level)
 
+    @property
+    def edge_noise(self) -> tuple[float, float]:
+        """Variance of a pixel on the brighter and on the darker side of the projectile's edge."""
+        levels = np.array([self.projectile_level + self.contrast, self.projectile_level])
+        bright, dark = self.noise.variance(levels)
+        return float(bright), float(dark)
+
     def surface_row(self, column: float) -> Measured | None:
         if self.surface is None:
             return None
@@ -127,6 +134,8 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     halfway = 0.5 * (lit_level + projectile_level)
     is_lit = (background > halfway) if dark else (background < halfway)
     surface, surface_sigma = find_surface(background, is_lit & seen, swept)
+    if surface is None:  # dust brighter than half the light
+        surface, surface_sigma = find_surface(background, _tell_from_dust(background, lit_level) & seen, swept)
     background = fill_holes(background, is_lit & seen, swept, surface)
     trusted = find_trusted(background)
     return Scene(
@@ -143,6 +152,12 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         surface_sigma=surface_sigma,
         ceiling=ceiling,
     )
+
+
+def _tell_from_dust(background: FloatArray, lit_level: float) -> np.ndarray:
+    """Pixels that are nearer to the light than to what fills the lowest rows of the picture."""
+    dust = float(np.median(background[-3:]))
+    return np.abs(background - lit_level) < np.abs(background - dust)
 
 
 def find_ceiling(bits: int, peak: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from ..records import FloatArray
 
 ROUGHEST_SURFACE = 3.0  # px rms about a straight line; beyond, it is a carpet or a picture, not raked dust
+LEAST_SIGMA = 0.02  # px: a surface as flat as that has an edge of its own
 
 
 def find_corridor(swept: np.ndarray) -> tuple[int, int]:
@@ -57,9 +58,33 @@ def find_surface(
         slope, offset = np.polyfit(x[keep], y[keep], 1)
         misfit = y - slope * x - offset
         keep = np.abs(misfit - np.median(misfit)) < 3.5 * max(1.4826 * np.median(np.abs(misfit)), 0.05)
-    roughness = float(np.std(misfit[keep]))
-    if roughness > ROUGHEST_SURFACE:
+    if float(np.std(misfit[keep])) > ROUGHEST_SURFACE:
         return None, 0.0
-    # neighbouring columns share the lumps of the surface: about one independent value per ten columns
-    sigma = max(roughness / np.sqrt(max(keep.sum() / 10.0, 1.0)), 0.02)
-    return (float(offset), float(slope)), sigma
+    sigma = _doubt_line(x[keep], misfit[keep], (left, right))
+    return (float(offset), float(slope)), max(sigma, LEAST_SIGMA)
+
+
+def _doubt_line(x: FloatArray, misfit: FloatArray, path: tuple[int, int]) -> float:
+    """Standard error of the surface's row under the projectile, from the misfits (n,) of a straight line beside its ``path``.
+
+    A lump of the surface is as long as 1 + 2 Σ ρ columns (ρ: correlation of two columns by their distance, up to where it
+    is gone); there are as many independent heights as lumps, and the line has taken two of them. The dust in the path has
+    lumps of its own.
+    """
+    left = np.zeros(int(x.max() - x.min()) + 1)
+    seen = np.zeros_like(left)
+    place = (x - x.min()).astype(int)
+    left[place], seen[place] = misfit - misfit.mean(), 1.0
+    variance = float(np.mean(left[place] ** 2))
+    long = 1.0
+    for lag in range(1, len(left) // 2):
+        pairs = float(np.sum(seen[lag:] * seen[:-lag]))
+        shared = float(np.sum(left[lag:] * left[:-lag])) / max(pairs, 1.0)
+        if pairs < 8 or shared <= 0.0:
+            break
+        long += 2.0 * shared / variance
+    lumps = max(len(x) / long, 3.0)
+    away = 0.5 * (path[0] + path[1]) - x.mean()
+    lever = 1.0 + away**2 / np.mean((x - x.mean()) ** 2)
+    own = min(long / (path[1] - path[0] + 1), 1.0)
+    return float(np.sqrt(variance * (lever / (lumps - 2.0) + own)))

@@ -6,7 +6,8 @@ from exact distances to the outline, not from a coarse mask, so that the true po
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -25,7 +26,11 @@ class Recording:
     vignette : loss of light in the corners; flicker : amplitude of the brightness in time; tilt, camera_rotation :
     degrees; drift : sideways motion over the record; exposure : share of a frame; spray : share of the strip above the
     surface covered by flying dust after contact; stripe : brightness of a reflection along the rod; glare : brightness
-    of a wandering blob; surface_lumps : rms roughness; dead : number of dead pixels; ceiling : level of saturation.
+    of a wandering blob; surface_lumps : rms roughness; dead : number of dead pixels; ceiling : level of saturation;
+    moved : px by which dust and projectile stand lower in each frame (a camera or a stand that moves); gamma : exponent of
+    the camera's response; distortion : radial, relative to the corner (positive: barrel); last_blur : blur in the last
+    frame, where focus drifts; readout : share of a frame by which the last row is read after the first; fields : whether odd
+    rows are read half a frame later than even ones.
     """
 
     shape: tuple[int, int] = (384, 128)
@@ -57,6 +62,12 @@ class Recording:
     ceiling: float = 255.0
     dropped: tuple[int, ...] = ()
     duplicated: tuple[int, ...] = ()
+    moved: tuple[float, ...] = ()
+    gamma: float = 1.0
+    distortion: float = 0.0
+    last_blur: float | None = None
+    readout: float = 0.0
+    fields: bool = False
 
 
 def fall_and_stop(
@@ -84,39 +95,51 @@ def evaluate_motion(t: FloatArray, speed: float, stop: float, gravity: float, sh
     return np.where(t < 0, speed * t + 0.5 * gravity * t**2, inside)
 
 
-def render(recording: Recording, depth: FloatArray, seed: int = 0) -> tuple[list[np.ndarray], FloatArray]:
+def render(
+    recording: Recording,
+    depth: FloatArray,
+    seed: int = 0,
+    disturb: Callable[[int, FloatArray], FloatArray] | None = None,
+) -> tuple[list[np.ndarray], FloatArray]:
     """Pictures of a drop whose tip is at ``depth`` (px below the surface, one per frame), and the true rows.
 
-    The rows are those of the tip along the line of the fall. Returns a list of (rows, columns) uint8 or uint16 and
-    (n,) px. Dropped frames are missing from both, duplicated ones come twice in the pictures.
+    The rows are those of the tip along the line of the fall, against dust that stands still. Returns a list of
+    (rows, columns) uint8 or uint16 and (n,) px. Dropped frames are missing from both, duplicated ones come twice in the
+    pictures. ``disturb`` may change the light (rows, columns) of frame i before the camera adds its noise.
     """
     rng = np.random.default_rng(seed)
     r = recording
     h, w = r.shape
     y, x = np.mgrid[0:h, 0:w].astype(float)
     light = r.bright * (1 - r.vignette * (((x - w / 2) / (w / 2)) ** 2 + ((y - h / 2) / (h / 2)) ** 2) / 2)
-    angle = np.radians(r.camera_rotation)
-    # coordinates of the laboratory: s along the fall, q across, zero where the fall meets the surface
-    s = (y - r.surface_row) * np.cos(angle) + (x - r.column) * np.sin(angle)
-    q = -(y - r.surface_row) * np.sin(angle) + (x - r.column) * np.cos(angle)
     lumps = np.zeros(w)
     if r.surface_lumps > 0:
         lumps = np.convolve(rng.normal(size=w + 20), np.hanning(21), mode="valid")[:w]
         lumps *= r.surface_lumps / np.std(lumps)
-    ground = _cover(s - lumps[None, :], r.blur)
     dead = rng.integers(0, h * w, r.dead)
     stuck = rng.uniform(0, 250, r.dead)
     scale = (2**r.bits - 1) / 255.0
     n = len(depth)
     pictures: list[np.ndarray] = []
     clouds = [(rng.uniform(-1, 1), rng.uniform(0, 1), rng.uniform(1.5, 5.0)) for _ in range(400)]
+    late = r.readout * y[:, :1] / h + (0.5 * (y[:, :1] % 2) if r.fields else 0.0)  # frames
+    s, q = _place(r, y, x, 0.0)
+    ground = _cover(s - lumps[None, :], r.blur)
+    sharp = r
     for i in range(n):
         if i in r.dropped:
             continue
+        if r.last_blur is not None:
+            r = replace(sharp, blur=sharp.blur + (r.last_blur - sharp.blur) * i / max(n - 1, 1))
+        if r.moved or r.last_blur is not None:
+            s, q = _place(r, y, x, r.moved[i] if r.moved else 0.0)
+            ground = _cover(s - lumps[None, :], r.blur)
         steps = [depth[i]]
         if r.exposure > 0:
             before = depth[i] - depth[max(i - 1, 0)] if i else depth[1] - depth[0]
             steps = [depth[i] + before * r.exposure * (k / 8.0 - 0.5) for k in range(9)]
+        elif r.readout > 0 or r.fields:
+            steps = [np.interp(i + late, np.arange(n), depth)]
         across = q - r.drift * (i / max(n - 1, 1) - 0.5)
         body = np.mean([_silhouette(r, s - z, across) for z in steps], axis=0)
         level = r.dark + r.stripe * np.exp(-0.5 * ((across - 0.2 * r.width) / 2.0) ** 2)
@@ -140,6 +163,10 @@ def render(recording: Recording, depth: FloatArray, seed: int = 0) -> tuple[list
             gx, gy = w * (0.3 + 0.4 * i / n), h * (0.2 + 0.5 * i / n)
             picture = picture + r.glare * np.exp(-0.5 * ((x - gx) ** 2 + (y - gy) ** 2) / 12.0**2)
         picture = picture * (1 + r.flicker * np.sin(1.7 * i + 0.4 * i**1.1))
+        if disturb is not None:
+            picture = disturb(i, picture)
+        if r.gamma != 1:
+            picture = 255.0 * (np.clip(picture, 0, None) / 255.0) ** r.gamma
         noise = np.sqrt(r.read_noise**2 + r.gain * np.clip(picture, 0, None))
         picture = picture + rng.normal(size=(h, w)) * noise
         picture.flat[dead] = stuck
@@ -151,6 +178,17 @@ def render(recording: Recording, depth: FloatArray, seed: int = 0) -> tuple[list
             pictures.append(counts.copy())
     rows = r.surface_row + np.delete(np.asarray(depth, float), list(r.dropped))
     return pictures, rows
+
+
+def _place(r: Recording, y: FloatArray, x: FloatArray, moved: float) -> tuple[FloatArray, FloatArray]:
+    """Coordinates of the laboratory of every pixel: along the fall from where it meets the surface, and across."""
+    h, w = r.shape
+    if r.distortion:
+        out = ((y - h / 2) ** 2 + (x - w / 2) ** 2) / ((h / 2) ** 2 + (w / 2) ** 2)
+        y, x = h / 2 + (y - h / 2) * (1 + r.distortion * out), w / 2 + (x - w / 2) * (1 + r.distortion * out)
+    angle = np.radians(r.camera_rotation)
+    down, aside = y - moved - r.surface_row, x - r.column
+    return down * np.cos(angle) + aside * np.sin(angle), -down * np.sin(angle) + aside * np.cos(angle)
 
 
 def _cover(distance: FloatArray, blur: float) -> FloatArray:

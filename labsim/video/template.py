@@ -14,10 +14,12 @@ PAD = 6  # px around a sampled region, so that the spline's ends do not matter
 
 
 class Template:
-    """Opacity around one end; ``opacity[i, j]`` belongs to row i + top, column j + left from the origin."""
+    """Opacity around one end; ``opacity[i, j]`` belongs to row i + top, column j + left from the origin. Where ``known`` is
+    False no picture showed it and its neighbours stand in."""
 
-    def __init__(self, opacity: FloatArray, top: int, left: int) -> None:
+    def __init__(self, opacity: FloatArray, top: int, left: int, known: np.ndarray | None = None) -> None:
         self.opacity, self.top, self.left = opacity, top, left
+        self.known = np.ones(opacity.shape, bool) if known is None else known
         self.coefficients = spline_filter(opacity, order=3, mode="mirror")
         self.shape = (opacity.shape[0] - 2 * MARGIN, opacity.shape[1] - 2 * MARGIN)
 

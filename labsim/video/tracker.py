@@ -22,6 +22,7 @@ from .lossy import widen_for_hidden
 from .outline import Outline, Outliner
 from .rod import LOSSY_TAILS, Positions, follow_rod
 from .scene import NEAR_CEILING, Scene, survey_scene
+from .steadiness import LEAST_CORRECTED, Movement, describe_movement, follow_surface
 
 
 @dataclass(frozen=True)
@@ -85,19 +86,32 @@ def follow_projectile(
             "by some hundredths of a pixel together; use less light"
         )
 
+    cut = [i for i, o in enumerate(outlines[0]) if o is not None and o.cut]
+    if len(cut) > 2:
+        warnings.append(
+            f"the picture's edge cuts the projectile in {len(cut)} frames (first: {cut[0]}): only a part of its round end is "
+            "fitted; frame it wider"
+        )
+
+    movement = follow_surface(frames, scene, _find_free_flight(outlines[0]))
+    if movement is not None:
+        warnings.append(describe_movement(movement))
+        if movement.size < LEAST_CORRECTED:
+            movement = None
+
     bead_like = is_bead(outlines[0])
-    found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings) if bead_like else None
+    found = _follow_bare_bead(frames, scene, usable, outlines[0], movement, warnings) if bead_like else None
     if found is None:
         try:
             check_direction(frames, outlines)
         except MeasurementError:
             # a hand that carries a ball up before it lets go is larger than the ball
             if not bead_like:
-                found = _follow_bare_bead(frames, scene, usable, outlines[0], warnings)
+                found = _follow_bare_bead(frames, scene, usable, outlines[0], movement, warnings)
             if found is None:
                 raise
     if found is None:
-        found = follow_rod(frames, scene, usable, outlines, warnings, progress, clipped=clipped)
+        found = follow_rod(frames, scene, usable, outlines, movement, warnings, progress, clipped=clipped)
     row, sigma, x = found.row, found.sigma, found.x
     reason = [
         ("repeats the frame before" if d else r) for r, d in zip(found.reason, scene.duplicate, strict=True)
@@ -135,8 +149,9 @@ def follow_projectile(
         reason=tuple(reason),
         warnings=tuple(dict.fromkeys(warnings)),
     )
-    if surface is not None:
-        surface = scene.surface_row(float(np.nanmedian(x)))
+    surface = scene.surface_row(float(np.nanmedian(x)))
+    if surface is not None and movement is not None:
+        surface = Measured(surface.value - movement.mean, surface.sigma)
     return Tracking(
         track,
         x,
@@ -154,13 +169,19 @@ def follow_projectile(
 
 
 def _follow_bare_bead(
-    frames: Frames, scene: Scene, usable: np.ndarray, outlines: list[Outline | None], warnings: list[str]
+    frames: Frames,
+    scene: Scene,
+    usable: np.ndarray,
+    outlines: list[Outline | None],
+    movement: Movement | None,
+    warnings: list[str],
 ) -> Positions | None:
     """Positions of a bare bead, whose lowest point stands for the tip; None where it is better served by a template."""
     bead = follow_bead(frames, scene, usable, outlines)
     if bead is None:
         return None
-    sigma = raise_to_scatter(bead.y, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0)
+    moved, doubt = (0.0, 0.0) if movement is None else (movement.choose(bead.y), movement.sigma)
+    sigma = raise_to_scatter(bead.y - moved, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0)
     if frames.lossy:
         sigma = sigma * widen_for_hidden(frames.codec)
     longest = float(np.nanmax(bead.smear))
@@ -169,8 +190,8 @@ def _follow_bare_bead(
             f"the bead is smeared by up to {longest:.1f} px: it is followed as a smeared disc, rows are at mid exposure"
         )
     return Positions(
-        row=bead.y + bead.radius,
-        sigma=sigma,
+        row=bead.y + bead.radius - moved,
+        sigma=np.hypot(sigma, doubt),
         x=bead.x,
         top_row=bead.y - bead.radius,
         reason=bead.reason,
@@ -216,6 +237,13 @@ def _usable_pixels(scene: Scene) -> np.ndarray:
     if scene.surface is not None:
         usable &= y < scene.surface[0] + scene.surface[1] * x - 5.0
     return usable
+
+
+def _find_free_flight(outlines: list[Outline | None]) -> np.ndarray:
+    """Which frames (n,) come before the tip is first hidden."""
+    free = np.array([o is not None and o.tip is not None for o in outlines])
+    hidden = np.array([o is not None and o.tip is None and o.top is not None for o in outlines])
+    return free & (np.cumsum(hidden) == 0)
 
 
 def _outline_all(
