@@ -186,7 +186,8 @@ def make_case(case: Case) -> tuple[list[np.ndarray], np.ndarray, dict[str, float
     pictures, rows = render(replace(SOUND, **case.settings), depth, SEED, case.disturb)
     if case.change is not None:
         pictures = case.change(pictures)
-    return [p for i, p in enumerate(pictures) if i not in case.missing], rows, truth
+    kept = [i for i in range(len(pictures)) if i not in case.missing]
+    return [pictures[i] for i in kept], rows[kept], truth
 
 
 def open_pictures(pictures: list[np.ndarray], codec: tuple[str, int] | None) -> Frames:
@@ -213,7 +214,7 @@ def judge(case: Case) -> list[str]:
     except LabsimError as refusal:
         return ["refused"] + [""] * 7 + [str(refusal).split(": ", 2)[-1]]
     track = seen.track
-    error = track.tip_row - rows[track.frame]
+    error = track.tip_row - rows
     good = track.valid
     cells = [
         f"{good.sum()}/{good.size}",

@@ -11,16 +11,25 @@ from .surface import find_corridor
 
 
 def average_background(
-    frames: Frames, brightness: FloatArray, low: FloatArray, high: FloatArray, swept: np.ndarray, dark: bool
+    frames: Frames,
+    brightness: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    swept: np.ndarray,
+    dark: bool,
+    left_out: np.ndarray,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Mean of each pixel over the frames in which the projectile and its blurred edge are well away from it."""
+    """Mean of each pixel over the frames in which the projectile and its blurred edge are well away from it.
+
+    left_out : (n,) frames that do not count.
+    """
     every = max(1, len(brightness) // 300)
     halfway = 0.5 * (low + high)
     total = np.zeros(frames.shape, np.float64)
     count = np.zeros(frames.shape, np.int32)
     kernel = np.ones((9, 9), np.uint8)
     for i, picture in enumerate(frames):
-        if i % every:
+        if i % every or left_out[i]:
             continue
         level = picture.astype(np.float32) / np.float32(brightness[i])
         blurred = cv2.blur(picture, (3, 3)).astype(np.float32) / np.float32(brightness[i])

@@ -241,8 +241,9 @@ def fit_edge(
     level: float,
     brightness: float,
     ceiling: float = np.inf,
-) -> tuple[float, float] | None:
-    """Second, independent estimate: erf edge fitted to the top's middle columns. Returns the origin's row and sigma.
+) -> tuple[float, float, float] | None:
+    """Second, independent estimate: erf edge fitted to the top's middle columns. Returns the origin's row, its sigma, and the
+    blur of this edge to first order about that of the template (px).
 
     Pixels at the ``ceiling`` do not count.
     """
@@ -278,5 +279,7 @@ def fit_edge(
         q += step
         if abs(step[0]) < 1e-4:
             sigma = np.sqrt(max(np.linalg.inv(normal)[0, 0], 0.0))
-            return float(q[0] - offset), float(sigma)
+            wider = (parts[0] * s.ravel()) * weight.ravel()
+            change = float(wider @ (image - model).ravel()) / max(float(wider @ (parts[0] * s.ravel())), 1e-30)
+            return float(q[0] - offset), float(sigma), blur + change
     return None

@@ -51,7 +51,7 @@ def compare_fields(
                 fit.x,
                 fit.level,
                 fit.brightness,
-                ceiling=scene.limit,
+                ceiling=scene.find_limit(i),
             )
             for rows in (parity, ~parity)
         ]

@@ -81,7 +81,7 @@ def start_end(
         floor = min(floor, scene.surface[0] + scene.surface[1] * float(np.nanmedian(x)) - 6.0)
     free = np.isfinite(y) & (y + top > -MARGIN - 4)
     free &= (y + min(bottom, 9) < floor) if which == "tip" else (y + 12 < floor)
-    free &= ~scene.duplicate
+    free &= ~(scene.duplicate | scene.overexposed)
     candidates = np.flatnonzero(free)
     if len(candidates) < 2:
         return None
@@ -158,7 +158,7 @@ def _register_all(
             x[i] + shift_x,
             level=scene.projectile_level * scene.brightness[i],
             brightness=float(scene.brightness[i]),
-            ceiling=scene.limit,
+            ceiling=scene.find_limit(i),
         )
         if fit is None:
             reason[i] = f"{which} end cannot be registered"
@@ -210,7 +210,7 @@ def follow_entering(
             float(top.x[i] + side),
             level=scene.projectile_level * float(scene.brightness[i]),
             brightness=float(scene.brightness[i]),
-            ceiling=scene.limit,
+            ceiling=scene.find_limit(i),
         )
         if fit is None or not fit.sigma < 8 * usual or fit.lost > 0.2:
             continue

@@ -9,6 +9,7 @@ from .ends import fit_edge
 from .following import EndTrack, Progress
 from .frames import Frames
 from .scene import Scene
+from .sharpness import describe_sharpness
 
 LEAST_CHANGE = 0.03  # px of the rod's length
 STEADY = 8.0  # standard errors of a slope
@@ -69,7 +70,7 @@ def compare_with_edge(
 ) -> float | None:
     """Second estimate by the erf edge; frames that disagree by far are rejected. Returns the rms difference."""
     count = len(row)
-    difference, error = np.full(count, np.nan), np.full(count, np.nan)
+    difference, error, blur = (np.full(count, np.nan) for _ in range(3))
     for i, picture in enumerate(frames):
         if np.isfinite(top.y[i]):
             second = fit_edge(
@@ -82,13 +83,16 @@ def compare_with_edge(
                 float(top.x[i]),
                 scene.projectile_level * float(scene.brightness[i]),
                 float(scene.brightness[i]),
-                scene.limit,
+                scene.find_limit(i),
             )
             if second is not None:
                 difference[i], error[i] = second[0] - top.y[i], np.hypot(second[1], top.sigma[i])
+                blur[i] = second[2]
     known = np.isfinite(difference)
     if known.sum() < 4:
         return None
+    sharpness = None if frames.lossy else describe_sharpness(blur, top.y)
+    warnings += [] if sharpness is None else [sharpness]
     difference -= np.nanmedian(difference)
     spread = max(1.4826 * float(np.nanmedian(np.abs(difference))), float(np.nanmedian(error)))
     wrong = known & (np.abs(difference) > np.maximum(0.08, 6 * spread))

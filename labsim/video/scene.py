@@ -17,6 +17,7 @@ from .surface import find_corridor, find_surface
 
 NEAR_CEILING = 0.99  # of the ceiling: a mean that high holds clipped pixels
 LEAST_CONTRAST = 4.0  # times the noise; below, every method fails (Cheezum et al. 2001)
+BRIGHTEST = 0.02  # of the pixels: a frame in which so many stand at the ceiling is overexposed
 SPARSE = 4096  # pixels that stand for the picture where brightness and noise are followed in time
 NOISE_FRAMES = 600
 
@@ -30,6 +31,7 @@ class Scene:
     corridor : first and last column of the projectile's path;
     brightness : (n,) of each frame; duplicate : (n,) whether a frame repeats the one before, bit by bit;
     surface : row of the dust's surface along a column x: rows = surface[0] + surface[1] · x, None where none is seen;
+    overexposed : (n,) whether a frame is so much brighter than most that its background stands at the ceiling;
     limit : the ceiling where the background is the light without it, else infinite.
     """
 
@@ -45,6 +47,7 @@ class Scene:
     surface: tuple[float, float] | None
     surface_sigma: float
     ceiling: float
+    overexposed: np.ndarray
     limit: float = np.inf
 
     @property
@@ -60,6 +63,10 @@ class Scene:
         bright, dark = self.noise.variance(levels)
         return float(bright), float(dark)
 
+    def find_limit(self, frame: int) -> float:
+        """Grey level at which the pixels of one frame saturate, infinite where none of its background does."""
+        return self.ceiling if self.overexposed[frame] else self.limit
+
     def surface_row(self, column: float) -> Measured | None:
         if self.surface is None:
             return None
@@ -70,7 +77,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     """Two passes over the video: what moves, then the background behind it. Raises MeasurementError."""
     path = frames.path
     low = high = first = previous = None
-    brightness, sparse, duplicate, peak = [], [], [], 0
+    brightness, sparse, duplicate, highest, peak = [], [], [], [], 0
     step = max(1, int(np.sqrt(frames.shape[0] * frames.shape[1] / SPARSE)))
     for i, picture in enumerate(frames):
         small = picture[::step, ::step].astype(np.float32)
@@ -83,6 +90,8 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         duplicate.append(previous is not None and np.array_equal(picture, previous))
         previous = picture
         peak = max(peak, int(picture.max()))
+        brightest = max(1, int(BRIGHTEST * small.size))
+        highest.append(float(np.partition(small, -brightest, axis=None)[-brightest]))
         brightness.append(level if level > 0 else 1.0)
         if len(sparse) < NOISE_FRAMES:
             sparse.append(small / brightness[-1])
@@ -98,6 +107,9 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     brightness_array = np.array(brightness)
     ceiling = find_ceiling(frames.bits, peak)
     noise = measure_noise(np.array(sparse), ceiling)
+    overexposed = np.array(highest) >= NEAR_CEILING * ceiling
+    if np.mean(overexposed) > 0.5:
+        overexposed[:] = False  # not these frames, but the light is too bright
     span = high - low
     floor = float(np.median(span))
     threshold = max(_otsu(span), floor + 3.0)
@@ -128,7 +140,9 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     projectile_level = float(np.percentile(low[moved], 25) if dark else np.percentile(high[moved], 75))
     # the extremes over many frames lie a few standard deviations out
     projectile_level += (1 if dark else -1) * 0.6 * pixel_noise
-    background, seen = average_background(frames, brightness_array, low, high, swept, dark)
+    background, seen = average_background(
+        frames, brightness_array, low, high, swept, dark, overexposed
+    )
     scene_level = np.where(seen, background, np.nan)
     lit_level = float(np.nanmedian(scene_level[swept])) if np.any(seen & swept) else float(np.median(beside))
     halfway = 0.5 * (lit_level + projectile_level)
@@ -151,6 +165,7 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         surface=surface,
         surface_sigma=surface_sigma,
         ceiling=ceiling,
+        overexposed=overexposed,
     )
 
 
