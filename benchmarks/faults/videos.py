@@ -99,7 +99,9 @@ def curtain(i: int, light: np.ndarray, high: float, solid: bool = False) -> np.n
 
 
 def reflection(i: int, light: np.ndarray) -> np.ndarray:
-    return light + 80.0 * np.exp(-0.5 * (((X - SOUND.column) / 3.0) ** 2 + ((Y - 200.0 + 1.5 * i) / 6.0) ** 2))
+    return light + 80.0 * np.exp(
+        -0.5 * (((X - SOUND.column) / 3.0) ** 2 + ((Y - 200.0 + 1.5 * i) / 6.0) ** 2)
+    )
 
 
 def second(i: int, light: np.ndarray) -> np.ndarray:
@@ -122,7 +124,9 @@ SINE = np.sin(2 * np.pi * MOMENTS / 7.3)
 CASES: dict[str, Case] = {
     "clean": Case(("0.005", "1.0", "+0.2", NOTHING)),
     "flicker30_random": Case(("0.046", "2.0", "-1.9", NOTHING), disturb=flicker),
-    "moving_shadow": Case(("", "", "", "refused: the projectile moves upwards; give --rotate 180"), disturb=shadow),
+    "moving_shadow": Case(
+        ("", "", "", "refused: the projectile moves upwards; give --rotate 180"), disturb=shadow
+    ),
     "vibration_1px": Case(("0.708", "36.7", "+0.1", "the tip scatters 3.6 times"), {"moved": tuple(SINE)}),
     "vibration_3px_vignette": Case(
         ("2.117", "36.1", "+0.0", "the tip scatters 11.3 times"), {"moved": tuple(3 * SINE), "vignette": 0.4}
@@ -140,7 +144,8 @@ CASES: dict[str, Case] = {
     "interlaced": Case(("0.280", "38.7", "+1.5", "registration and erf edge differ"), {"fields": True}),
     "field_doubled": Case(("0.502", "0.6", "", "the tip scatters 152.3 times"), change=double_fields),
     "dropped_silently_3_5": Case(
-        ("0.006", "1.1", "+0.1", "3 frames are missing; 5 frames are missing"), missing=(20, 21, 22, 48, 49, 50, 51, 52)
+        ("0.006", "1.1", "+0.1", "3 frames are missing; 5 frames are missing"),
+        missing=(20, 21, 22, 48, 49, 50, 51, 52),
     ),
     "dropped_1_near_stop": Case(("0.005", "1.0", "+0.1", NOTHING), missing=(60, 65, 70)),
     "mjpeg_q10": Case(("0.011", "1.0", "+0.1", "compressed with loss"), codec=("MJPG", 10)),
@@ -162,12 +167,15 @@ CASES: dict[str, Case] = {
         ("0.006", "1.1", "", "top end disturbed"), disturb=lambda i, light: curtain(i, light, 180.0)
     ),
     "curtain_solid_rising": Case(
-        ("0.005", "1.0", "", "top end disturbed"), disturb=lambda i, light: curtain(i, light, 150.0, solid=True)
+        ("0.005", "1.0", "", "top end disturbed"),
+        disturb=lambda i, light: curtain(i, light, 150.0, solid=True),
     ),
     "rolling_shutter": Case(("1.139", "182.2", "+6.7", NOTHING), {"readout": 0.9}),
     "focus_drifts": Case(("0.085", "7.5", "+6.1", "length of the rod scatters"), {"last_blur": 3.0}),
     "gamma_camera": Case(("0.233", "29.4", "-11.5", NOTHING), {"gamma": 0.45}),
-    "barrel_distortion": Case(("1.085", "184.4", "-51.9", "length of the rod scatters"), {"distortion": 0.03}),
+    "barrel_distortion": Case(
+        ("1.085", "184.4", "-51.9", "length of the rod scatters"), {"distortion": 0.03}
+    ),
     "light_step_half": Case(("0.007", "0.8", "-0.2", NOTHING), disturb=light_step),
     "drifting_dirt": Case(("0.034", "3.6", "-1.8", "length of the rod scatters"), disturb=dirt),
     "banding_noise": Case(("0.047", "1.0", "-0.5", "the tip scatters 2.1 times"), disturb=bands),
@@ -181,7 +189,13 @@ CASES: dict[str, Case] = {
 
 def make_case(case: Case) -> tuple[list[np.ndarray], np.ndarray, dict[str, float]]:
     """Pictures, true rows of each, and the true figures of the fall (px, frames)."""
-    motion = {"count": COUNT, "contact": CONTACT, "speed": 2.3, "stop": 30.0, "gravity": GRAVITY} | case.motion
+    motion = {
+        "count": COUNT,
+        "contact": CONTACT,
+        "speed": 2.3,
+        "stop": 30.0,
+        "gravity": GRAVITY,
+    } | case.motion
     depth, truth = fall_and_stop(motion.pop("count"), **motion)
     pictures, rows = render(replace(SOUND, **case.settings), depth, SEED, case.disturb)
     if case.change is not None:
@@ -224,8 +238,16 @@ def judge(case: Case) -> list[str]:
         f"{np.sqrt(np.mean((error / track.sigma)[good] ** 2)):.1f}",
     ]
     said = list(track.warnings)
-    row, row_sigma = (surface, STATED_SIGMA) if case.stated or seen.surface is None else (seen.surface.value, seen.surface.sigma)
-    return [*cells, *measure(track, Camera(RATE, PIXEL, row, row_sigma), truth, said), "; ".join(said) or NOTHING]
+    row, row_sigma = (
+        (surface, STATED_SIGMA)
+        if case.stated or seen.surface is None
+        else (seen.surface.value, seen.surface.sigma)
+    )
+    return [
+        *cells,
+        *measure(track, Camera(RATE, PIXEL, row, row_sigma), truth, said),
+        "; ".join(said) or NOTHING,
+    ]
 
 
 def measure(track: Track, camera: Camera, truth: dict[str, float], said: list[str]) -> list[str]:
@@ -244,10 +266,14 @@ def measure(track: Track, camera: Camera, truth: dict[str, float], said: list[st
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("case", nargs="*", help=f"any of: {', '.join(CASES)}; default: all")
     chosen = parser.parse_args().case or list(CASES)
-    print("| adversity | rms, pull, D before | rows | rms | offset | error bar | pull | v0 | D | T_s | said before | said |")
+    print(
+        "| adversity | rms, pull, D before | rows | rms | offset | error bar | pull | v0 | D | T_s | said before | said |"
+    )
     print("|" + " --- |" * 12)
     for name in chosen:
         rms, pull, depth, said = CASES[name].before

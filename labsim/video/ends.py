@@ -112,7 +112,8 @@ def find_tip_point(
     Under a saturated background only what is darker was recorded (opacity ``known_above``) and counts. None where the end
     is not round.
     """
-    m, known = (a if lower else a[::-1] for a in (template.opacity, template.known))
+    m = template.opacity if lower else template.opacity[::-1]
+    known = template.known if lower else template.known[::-1]
     h, w = m.shape
     rows = np.arange(h, dtype=float)
     columns = np.arange(w, dtype=float)
@@ -280,6 +281,8 @@ def fit_edge(
         if abs(step[0]) < 1e-4:
             sigma = np.sqrt(max(np.linalg.inv(normal)[0, 0], 0.0))
             wider = (parts[0] * s.ravel()) * weight.ravel()
-            change = float(wider @ (image - model).ravel()) / max(float(wider @ (parts[0] * s.ravel())), 1e-30)
+            change = float(wider @ (image - model).ravel()) / max(
+                float(wider @ (parts[0] * s.ravel())), 1e-30
+            )
             return float(q[0] - offset), float(sigma), blur + change
     return None

@@ -66,6 +66,6 @@ def compare_fields(
     if abs(share) < max(LEAST_APART, CERTAIN * float(np.median(sigma)) / np.sqrt(len(sigma))):
         return None
     return (
-        f"odd and even rows show the projectile {abs(share):.2f} frames apart: the video is interlaced, and rows are wrong by up to "
-        f"{0.5 * float(np.max(np.abs(step[sorted(chosen)]))):.2f} px; make a picture of each field"
+        f"odd and even rows show the projectile {abs(share):.2f} frames apart: the video is interlaced, and rows are wrong "
+        f"by up to {0.5 * float(np.max(np.abs(step[sorted(chosen)]))):.2f} px; make a picture of each field"
     )

@@ -133,11 +133,13 @@ def describe_length(row: FloatArray, gap: FloatArray, variance: FloatArray) -> s
     change, path = slope * float(np.ptp(row)), float(np.ptp(row))
     if abs(change) > LEAST_CHANGE and abs(slope) > STEADY * left / np.sqrt(np.sum(row**2)):
         return (
-            f"the rod gets {abs(change):.2f} px {'longer' if change > 0 else 'shorter'} while it falls through {path:.0f} px: lens "
-            "distortion, a fall out of the plane, focus, or a shutter that reads row after row; scale and rows change with it"
+            f"the rod gets {abs(change):.2f} px {'longer' if change > 0 else 'shorter'} while it falls through {path:.0f} px: "
+            "lens distortion, a fall out of the plane, focus, or a shutter that reads row after row; rows err with it"
         )
     if scatter > max(LEAST_CHANGE, 3 * noise):
-        return f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane, or pass dirt?"
+        return (
+            f"length of the rod scatters by {scatter:.3f} px: does it turn or leave the plane, or pass dirt?"
+        )
     return None
 
 

@@ -10,7 +10,9 @@ import numpy as np
 from ..records import FloatArray
 from .scene import Scene
 
-CUT_SHARE = 0.3  # of a body's rows that reach the picture's edge; flying dust that touches both reaches it in a few
+CUT_SHARE = (
+    0.3  # of a body's rows that reach the picture's edge; flying dust that touches both reaches it in a few
+)
 
 
 @dataclass(frozen=True)

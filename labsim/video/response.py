@@ -1,8 +1,8 @@
 """Whether the camera answers light in proportion: an edge that it draws lopsided says that it does not.
 
 Across a blurred edge the light is an error function of the distance, alike on both sides of its middle. A camera that records
-light to the power γ (0.45 in many colour and consumer cameras) draws it steeper on the dark side, and half its height no longer lies at the
-edge.
+light to the power γ (0.45 in many colour and consumer cameras) draws it steeper on the dark side, and half its height no
+longer lies at the edge.
 """
 
 from __future__ import annotations

@@ -13,7 +13,14 @@ from .ends import find_edge, find_tip_point, measure_shaft
 from .fields import compare_fields
 from .following import EndTrack, Progress, follow_end, follow_entering, restore_light
 from .frames import Frames
-from .joining import clip_gap, compare_lengths, compare_with_edge, describe_length, join_ends, raise_to_scatter
+from .joining import (
+    clip_gap,
+    compare_lengths,
+    compare_with_edge,
+    describe_length,
+    join_ends,
+    raise_to_scatter,
+)
 from .lossy import measure_widening, widen_for_hidden
 from .outline import Outline
 from .response import describe_response, find_gamma
@@ -61,6 +68,12 @@ def follow_rod(
     Raises MeasurementError where the tip is never seen free.
     """
     count = len(scene.brightness)
+    cut = [i for i, o in enumerate(outlines[0]) if o is not None and o.cut]
+    if len(cut) > 2:
+        warnings.append(
+            f"the picture's edge cuts the projectile in {len(cut)} frames (first: {cut[0]}): only a part of its round end is "
+            "fitted; frame it wider"
+        )
     if clipped:
         scene = restore_light(frames, scene, usable, outlines)
     top = follow_end(frames, scene, usable, outlines, "top", progress)
@@ -90,7 +103,9 @@ def follow_rod(
         tip_offset, tip_radius = float(rows[-1]) + 0.5 + tip.template.top, None
     else:
         tip_offset, tip_radius = round_end[0] + round_end[2], round_end[2]
-    moved, unsteady = (0.0, 0.0) if movement is None else (movement.choose(tip.y), movement.sigma)
+    moved, unsteady = (
+        (0.0, 0.0) if movement is None else (movement.choose(tip.y + tip_offset), movement.sigma)
+    )
 
     def raise_error(end: EndTrack, sigma: FloatArray, what: str) -> FloatArray:
         known = np.hypot(sigma, unsteady)
@@ -170,7 +185,18 @@ def follow_rod(
             if raised >= 1.05
             else f"compressed with loss ({frames.codec.upper()}): no error bar had to be raised for {cause}"
         )
-    return Positions(row - moved, np.hypot(sigma, unsteady), x, top_row, reason, length, diameter, tip_radius, tilt, edge_rms)
+    return Positions(
+        row - moved,
+        np.hypot(sigma, unsteady),
+        x,
+        top_row,
+        reason,
+        length,
+        diameter,
+        tip_radius,
+        tilt,
+        edge_rms,
+    )
 
 
 def _find_gamma(scene: Scene, usable: np.ndarray, end: EndTrack) -> tuple[float, float, float] | None:

@@ -140,16 +140,16 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     projectile_level = float(np.percentile(low[moved], 25) if dark else np.percentile(high[moved], 75))
     # the extremes over many frames lie a few standard deviations out
     projectile_level += (1 if dark else -1) * 0.6 * pixel_noise
-    background, seen = average_background(
-        frames, brightness_array, low, high, swept, dark, overexposed
-    )
+    background, seen = average_background(frames, brightness_array, low, high, swept, dark, overexposed)
     scene_level = np.where(seen, background, np.nan)
     lit_level = float(np.nanmedian(scene_level[swept])) if np.any(seen & swept) else float(np.median(beside))
     halfway = 0.5 * (lit_level + projectile_level)
     is_lit = (background > halfway) if dark else (background < halfway)
     surface, surface_sigma = find_surface(background, is_lit & seen, swept)
     if surface is None:  # dust brighter than half the light
-        surface, surface_sigma = find_surface(background, _tell_from_dust(background, lit_level) & seen, swept)
+        surface, surface_sigma = find_surface(
+            background, _tell_from_dust(background, lit_level) & seen, swept
+        )
     background = fill_holes(background, is_lit & seen, swept, surface)
     trusted = find_trusted(background)
     return Scene(

@@ -33,8 +33,8 @@ def describe_sharpness(blur: FloatArray, row: FloatArray) -> str | None:
             f"{share:.1f} of a frame): rows of its tip may err by some tenths of a pixel; expose shorter"
         )
     return (
-        f"the blur of the edges changes from {np.sqrt(max(first, 0.0)):.1f} to {np.sqrt(max(last, 0.0)):.1f} px during the record: "
-        "the focus drifts, or the projectile leaves the plane of focus, and the rows of its round end drift with it"
+        f"the blur of the edges changes from {np.sqrt(max(first, 0.0)):.1f} to {np.sqrt(max(last, 0.0)):.1f} px during the "
+        "record: the focus drifts, or the projectile leaves the plane of focus, and the rows of its round end drift with it"
     )
 
 
@@ -47,4 +47,10 @@ def _fit_line(x: FloatArray, y: FloatArray) -> tuple[float, float, float, float,
         size = float(np.median(np.abs(left)))
         keep = np.abs(left) < 6.0 * size + 1e-9
     error = 1.4826 * size / (np.std(x[keep]) * np.sqrt(keep.sum()) + 1e-30)
-    return float(slope), float(slope * x[0] + offset), float(slope * x[-1] + offset), size, abs(slope) / (error + 1e-30)
+    return (
+        float(slope),
+        float(slope * x[0] + offset),
+        float(slope * x[-1] + offset),
+        size,
+        abs(slope) / (error + 1e-30),
+    )

@@ -7,6 +7,7 @@ spray, a crater's rim and compression do not.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,9 @@ LEAST_COLUMNS = 8
 MOST_COLUMNS = 160  # beyond, every second or third is taken: their information is more than enough
 TOGETHER = 4.0  # times what the blocks do apart; flying dust and H.264 reach 3
 LEAST_SEEN = 0.03  # px rms
-LEAST_CORRECTED = 0.1  # px rms; noise in whole rows and focus that drifts make 0.03 to 0.06, which the rod does not share
+LEAST_CORRECTED = (
+    0.1  # px rms; noise in whole rows and focus that drifts make 0.03 to 0.06, which the rod does not share
+)
 MOST_PASSES = 6
 CHUNK = 500  # frames that are taken as floating numbers at a time
 
@@ -31,12 +34,13 @@ CHUNK = 500  # frames that are taken as floating numbers at a time
 class Movement:
     """How much lower the dust lies in each frame than before contact, (n,) px, and its error bar.
 
-    before : (n,) whether the projectile is still in free flight.
+    before : (n,) whether the tip still stands clear of the dust; surface : row of the dust's surface before contact.
     """
 
     shift: FloatArray
     sigma: FloatArray
     before: np.ndarray
+    surface: float
 
     @property
     def size(self) -> float:
@@ -50,18 +54,24 @@ class Movement:
     def choose(self, row: FloatArray) -> FloatArray:
         """What is to be taken off the rows, (n,): all of it where the camera moves, none before contact where the dust does.
 
-        A projectile in free flight shakes in the picture only if the camera does. row : (n,) NaN where unknown.
+        A projectile in free flight shakes in the picture only if the camera does. row : (n,) of the tip, NaN where unknown.
         """
-        free, seen = self.before, np.where(self.before, row, np.nan)
+        seen = np.where(self.before, row, np.nan)
         if _scatter(seen - self.shift) <= _scatter(seen):
             return self.shift
-        return np.where(free, 0.0, self.shift)
+        known = np.flatnonzero(np.isfinite(seen))
+        last = known[-1]
+        speed = float(np.median(np.diff(row[known[-6:]]) / np.diff(known[-6:])))
+        contact = last + (self.surface - row[last]) / max(speed, 1e-6)
+        return np.where(np.arange(len(row)) < contact, 0.0, self.shift)
 
 
-def follow_surface(frames: Frames, scene: Scene, before: np.ndarray) -> Movement | None:
+def follow_surface(
+    frames: Frames, scene: Scene, before: np.ndarray, surface: float | None
+) -> Movement | None:
     """Movement of the dust's surface; None where it stands still, or does not move as a whole, or cannot be seen.
 
-    before : (n,) whether the projectile is still in free flight.
+    before : (n,) whether the tip still stands clear of the dust; surface : row that is stated, None where the picture says it.
     """
     blocks = _cut_blocks(scene)
     if len(blocks) < 2 or before.sum() < 4:
@@ -71,13 +81,13 @@ def follow_surface(frames: Frames, scene: Scene, before: np.ndarray) -> Movement
     mean = stack.mean(axis=0, dtype=float)
     variance = scene.noise.variance(mean)
     edges = np.cumsum([0, *(len(b) for b in blocks)])
-    parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
     rough = [_judge_once(stack[:, :, p], mean[:, p], variance[:, p]) for p in parts]
     if not _move_together(np.array([r[0] for r in rough]), rough[0][1]):
         return None
-    found = [_align(stack[:, :, p], variance[:, p]) for p in parts]
-    shifts = np.array([f[0] - np.median(f[0][before]) for f in found])
-    error = float(np.median([f[1] for f in found]))
+    aligned = [_align(stack[:, :, p], variance[:, p]) for p in parts]
+    shifts = np.array([f[0] - np.median(f[0][before]) for f in aligned])
+    error = float(np.median([f[1] for f in aligned]))
     if not _move_together(shifts, error):
         return None
     together = np.median(shifts, axis=0)
@@ -85,7 +95,11 @@ def follow_surface(frames: Frames, scene: Scene, before: np.ndarray) -> Movement
     apart = 1.4826 * np.median(np.abs(shifts - np.median(shifts, axis=0)), axis=0)
     # a median of blocks is 1.25 times less certain than their mean
     sigma = 1.25 * np.maximum(error, apart) / np.sqrt(len(shifts))
-    return Movement(together, sigma, before)
+    if surface is None:
+        found = scene.surface_row(0.5 * sum(scene.corridor))
+        assert found is not None  # the blocks lie on it
+        surface = found.value - float(np.mean(together))
+    return Movement(together, sigma, before, surface)
 
 
 def describe_movement(movement: Movement) -> str:
@@ -176,7 +190,6 @@ def _move_together(shifts: FloatArray, error: float) -> bool:
     apart = float(np.sqrt(np.mean((centred - together) ** 2) / len(shifts)))
     size = float(np.sqrt(np.mean(together**2)))
     return size > max(LEAST_SEEN, TOGETHER * apart, 2.0 * error / np.sqrt(len(shifts)))
-
 
 
 def _scatter(row: FloatArray) -> float:

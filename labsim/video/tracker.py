@@ -88,19 +88,12 @@ def follow_projectile(
             "by some hundredths of a pixel together; use less light"
         )
 
-    cut = [i for i, o in enumerate(outlines[0]) if o is not None and o.cut]
-    if len(cut) > 2:
-        warnings.append(
-            f"the picture's edge cuts the projectile in {len(cut)} frames (first: {cut[0]}): only a part of its round end is "
-            "fitted; frame it wider"
-        )
-
     if scene.overexposed.any():
         warnings.append(
-            f"{int(scene.overexposed.sum())} frames are overexposed (first: {int(np.argmax(scene.overexposed))}): their background "
-            "says only how bright it is at least; use less light, or light that does not flicker"
+            f"{int(scene.overexposed.sum())} frames are overexposed (first: {int(np.argmax(scene.overexposed))}): their "
+            "background says only how bright it is at least; use less light, or light that does not flicker"
         )
-    movement = follow_surface(frames, scene, _find_free_flight(outlines[0]))
+    movement = follow_surface(frames, scene, _find_free_flight(outlines[0]), surface_row)
     if movement is not None:
         warnings.append(describe_movement(movement))
         if movement.size < LEAST_CORRECTED:
@@ -194,8 +187,10 @@ def _follow_bare_bead(
     bead = follow_bead(frames, scene, usable, outlines)
     if bead is None:
         return None
-    moved, doubt = (0.0, 0.0) if movement is None else (movement.choose(bead.y), movement.sigma)
-    sigma = raise_to_scatter(bead.y - moved, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0)
+    moved, doubt = (0.0, 0.0) if movement is None else (movement.choose(bead.y + bead.radius), movement.sigma)
+    sigma = raise_to_scatter(
+        bead.y - moved, bead.sigma, "the bead", warnings, LOSSY_TAILS if frames.lossy else 4.0
+    )
     if frames.lossy:
         sigma = sigma * widen_for_hidden(frames.codec)
     longest = float(np.nanmax(bead.smear))
