@@ -14,8 +14,10 @@ import importlib.util
 import keyword
 import os
 import pkgutil
+import signal
 import sys
 import textwrap
+import threading
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -33,6 +35,7 @@ for _name in THREADS:  # before numpy: the same sums on every machine, and no th
     os.environ.setdefault(_name, "1")
 
 STOPPED = 130  # what shells say of a command that was interrupted
+TERMINATED = 143  # and of one that was asked to end: 128 and the signal's number, 15
 
 
 def list_command_files() -> list[str]:
@@ -116,10 +119,12 @@ _UsageTrouble: Any = next(base for base in typer.BadParameter.__mro__ if base.__
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command and leave: 0 done, 2 bad input (one line on standard error), 130 stopped by the user."""
+    """Run one command and leave: 0 done, 2 bad input (one line on standard error), 130 or 143 stopped by a signal."""
     given = sys.argv[1:] if arguments is None else [str(each) for each in arguments]
     _provenance.remember(given)
     try:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, _end_as_interrupted)
         status = app(args=given, prog_name="labsim", standalone_mode=False)
     except LabsimError as trouble:
         options.drop_empty_folder()
@@ -143,11 +148,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
         status = _complain(
             f"{path}: {trouble.format_message().rstrip('.')}; {path} --help says what it takes", 2
         )
+    except Terminated:
+        status = TERMINATED
     except (KeyboardInterrupt, typer.Abort):
         status = STOPPED
-    if status == STOPPED:
-        _complain("stopped; start the same command again to go on from the stored runs", STOPPED)
+    if status in (STOPPED, TERMINATED):
+        _complain("stopped; start the same command again to go on from the stored runs", status)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+class Terminated(SystemExit):
+    """SIGTERM: batch systems, ``timeout`` and ``kill`` send it; what Ctrl-C leaves in order, it leaves in order."""
+
+
+def _end_as_interrupted(number: int, frame: object) -> None:
+    raise Terminated(TERMINATED)
 
 
 def _complain(text: str, status: int) -> int:

@@ -12,13 +12,13 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ..errors import LabsimError
-from ..inference.workers import is_loss, open_executor
+from ..inference.workers import explain_loss, open_executor, wait_for_any
 from . import _provenance, options
 
 Measure = Callable[
@@ -65,7 +65,7 @@ def measure_many(
                     item = waiting.pop(0)
                     source = item.source if scheduler is None else (item.name, _pack(item.source))
                     running[executor.submit(measure_one, measure, source, item.given)] = item
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                for future in wait_for_any(executor, running):
                     item = running.pop(future)
                     try:
                         files = future.result()
@@ -73,14 +73,9 @@ def measure_many(
                     except LabsimError as trouble:
                         failed[item.name] = str(trouble)
                     except Exception as trouble:
-                        if not is_loss(trouble):
+                        if (loss := explain_loss(executor, trouble, item.source)) is None:
                             raise
-                        raise LabsimError(
-                            item.source,
-                            "--workers",
-                            f"a worker died ({type(trouble).__name__}; out of memory?); start again, with fewer "
-                            "workers if it is memory: what is measured is kept",
-                        ) from None
+                        raise loss from None
                     done += 1
                     progress(done, len(todo), text)
     return {

@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,7 +35,7 @@ from .run_file import (
     write_run_file,
 )
 from .run_parts import AnyPart, Part
-from .workers import is_loss, open_executor
+from .workers import explain_loss, open_executor, wait_for_any
 
 Progress = Callable[[float, float, str], None]  # work done, all work (in any unit), what is done
 
@@ -181,7 +181,7 @@ class RunStore:
                     if todo:
                         time.sleep(0.2)
                     continue
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                for future in wait_for_any(executor, running):
                     key, setting, lock = running.pop(future)
                     try:
                         run, wall = future.result()
@@ -191,14 +191,9 @@ class RunStore:
                     self.new += 1
                     yield key, run
         except Exception as trouble:
-            if not is_loss(trouble):
+            if (loss := explain_loss(executor, trouble, self.folder)) is None:
                 raise
-            raise InferenceError(
-                self.folder,
-                "--workers",
-                f"a worker died ({type(trouble).__name__}; out of memory?); start again, with fewer workers if it is "
-                "memory: finished runs are stored",
-            ) from None
+            raise loss from None
         finally:
             for _key, _setting, lock in running.values():
                 lock.release()

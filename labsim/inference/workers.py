@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
 import os
 import platform
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
-from multiprocessing.connection import wait
 from typing import Any
 
-from ..errors import InferenceError
+from ..errors import InferenceError, LabsimError
 from ..records import Material, Projectile
 from ..sph import DropSetting, simulate, solver_hash
+from .processes import ProcessWorkers
+
+log = logging.getLogger(__name__)
+
+# s. Workers of a batch system come and go within seconds: a minute without any is worth a line. Ten minutes are longer than a
+# node needs to come back, and short against the hours that a command which waits for nothing would hold its place in a queue.
+LOOK_EVERY, SAID_AFTER, GIVEN_UP_AFTER = 5.0, 60.0, 600.0
 
 
 class InProcess(Executor):
@@ -35,12 +38,33 @@ class InProcess(Executor):
 class OnDask(Executor):
     """Work for the workers of a Dask client; what they return comes back here, they need no disk in common."""
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: Any, address: str) -> None:
+        self._client = client
         self._executor = client.get_executor(pure=False)
         self._solver = solver_hash()
+        self.address = address
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
         return self._executor.submit(run_with_solver, self._solver, fn, *args, **kwargs)
+
+    def count_workers(self) -> int:
+        """How many are there now. Raises InferenceError where the scheduler does not answer."""
+        try:
+            return len(self._client.nthreads())
+        except (OSError, ValueError, RuntimeError):  # distributed.CommClosedError is an OSError
+            raise self.lost() from None
+
+    def is_lost(self, trouble: BaseException) -> bool:
+        """Whether a future failed because the scheduler is gone: then its client cancels all of them."""
+        closed = isinstance(trouble, OSError) and type(trouble).__module__.startswith("distributed.")
+        return closed or isinstance(trouble, CancelledError) or self._client.status != "running"
+
+    def lost(self) -> InferenceError:
+        return InferenceError(
+            "",
+            "--scheduler",
+            f"{self.address} does not answer any more; start it again, and then the same command: what is finished is kept",
+        )
 
 
 def run_with_solver(solver: str, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -54,10 +78,55 @@ def run_with_solver(solver: str, fn: Callable[..., Any], *args: Any, **kwargs: A
     return fn(*args, **kwargs)
 
 
-def is_loss(trouble: BaseException) -> bool:
-    """Whether a future failed because its workers, or their scheduler, went away."""
-    return isinstance(trouble, (BrokenProcessPool, CancelledError)) or type(trouble).__module__.startswith(
-        "distributed."
+def wait_for_any(executor: Executor, running: Iterable[Future]) -> set[Future]:
+    """Those of the futures that are done, once one is.
+
+    Raises InferenceError where a scheduler had no worker for GIVEN_UP_AFTER, or is gone itself.
+    """
+    if not isinstance(executor, OnDask):
+        return wait(running, return_when=FIRST_COMPLETED).done
+    alone_since, said = None, False
+    while not (done := wait(running, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done):
+        now = time.monotonic()
+        if executor.count_workers() > 0:
+            alone_since, said = None, False
+            continue
+        alone_since = alone_since or now
+        if now - alone_since >= GIVEN_UP_AFTER:
+            raise InferenceError(
+                "",
+                "--scheduler",
+                f"{executor.address} has had no workers for {now - alone_since:.0f} s; start dask worker "
+                f"{executor.address} and the same command again, what is finished is kept",
+            )
+        if now - alone_since >= SAID_AFTER and not said:
+            said = True
+            log.warning(
+                "all workers of %s are gone for %.0f s; waiting %.0f s more for others (dask worker %s)",
+                executor.address,
+                now - alone_since,
+                GIVEN_UP_AFTER - (now - alone_since),
+                executor.address,
+            )
+    return done
+
+
+def explain_loss(executor: Executor, trouble: BaseException, where: object) -> InferenceError | None:
+    """The error to raise where a future failed because its worker or the scheduler went away; None where it did not."""
+    if isinstance(trouble, LabsimError):
+        return None
+    if isinstance(executor, OnDask):
+        if executor.is_lost(trouble):
+            return executor.lost()
+        if not type(trouble).__module__.startswith("distributed."):
+            return None
+    elif not isinstance(trouble, BrokenExecutor):
+        return None
+    said = str(trouble) if isinstance(trouble, BrokenExecutor) else type(trouble).__name__
+    return InferenceError(
+        where,
+        "--workers",
+        f"a worker died ({said}; out of memory?); start again, with fewer workers if it is memory: what is finished is kept",
     )
 
 
@@ -81,22 +150,16 @@ def open_executor(
     if pool is None:
         if compile_first:
             warm_up()  # once here, or every worker would
-        pool = ProcessPoolExecutor(
-            max_workers=count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker
-        )
-        _pools[count] = pool
+        pool = _pools[count] = ProcessWorkers(count)
     try:
         yield pool, count + 1
     except BaseException:
         _pools.pop(count, None)
-        workers_now = list((pool._processes or {}).values())  # shutdown forgets them
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in workers_now:
-            process.terminate()  # a run of minutes is not waited for when the user stops
+        pool.end()
         raise
 
 
-_pools: dict[int, ProcessPoolExecutor] = {}  # kept from sweep to sweep: a fit asks for many small ones
+_pools: dict[int, ProcessWorkers] = {}  # kept from sweep to sweep: a fit asks for many small ones
 
 
 def warm_up() -> None:
@@ -119,21 +182,6 @@ def warm_up() -> None:
 def count_cores() -> int:
     """Cores this process may use (a container may have been given fewer than the machine has)."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _begin_worker() -> None:
-    """One thread a run; leave when the parent is gone, even when it was killed without a word; Ctrl-C is the parent's."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-
-        def watch() -> None:
-            wait([parent.sentinel])
-            os._exit(1)
-
-        threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager
@@ -164,4 +212,4 @@ def _open_dask(address: str) -> Iterator[tuple[Executor, int]]:
         slots = sum(client.nthreads().values())
         if slots == 0:
             raise InferenceError("", "--scheduler", f"{address} has no workers; start dask worker {address}")
-        yield OnDask(client), slots + max(2, slots // 4)
+        yield OnDask(client, address), slots + max(2, slots // 4)

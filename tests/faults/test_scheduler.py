@@ -17,6 +17,7 @@ from small_campaign import ROOT, add_videos_and_scans, copy_campaign
 
 from labsim.cli._compare import compare_folders
 from labsim.errors import InferenceError
+from labsim.inference import workers
 from labsim.inference.runs import RunStore, require_runs
 from labsim.inference.workers import run_with_solver
 from labsim.records import Material, Projectile
@@ -135,6 +136,35 @@ def run(*arguments: object, store: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_a_scheduler_without_workers_is_said_and_then_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With the times of workers.py in seconds instead of minutes."""
+    monkeypatch.setattr(workers, "LOOK_EVERY", 0.5)
+    monkeypatch.setattr(workers, "SAID_AFTER", 1.0)
+    monkeypatch.setattr(workers, "GIVEN_UP_AFTER", 4.0)
+    own = Cluster(tmp_path)
+    try:
+
+        def kill_all(done: float, total: float, text: str) -> None:
+            for worker in own.workers if done > 0 else ():
+                if worker.poll() is None:
+                    worker.kill()
+                    worker.wait()
+
+        store = RunStore(tmp_path / "store")
+        began = time.monotonic()
+        with pytest.raises(InferenceError, match="has had no workers for") as found:
+            settings = [small_drop(0.2 + 0.01 * k) for k in range(8)]
+            store.get_many(settings, scheduler=own.address, progress=kill_all)
+        assert time.monotonic() - began < 60.0
+    finally:
+        own.close()
+    said = [record.getMessage() for record in caplog.records if record.name == workers.log.name]
+    assert len(said) == 1 and f"all workers of {own.address} are gone" in said[0]
+    assert "\n" not in str(found.value) and own.address in str(found.value)
+
+
 @pytest.mark.parametrize("command", ["track", "ct"])
 def test_measurements_of_a_campaign_are_the_same_there(
     cluster: Cluster, tmp_path: Path, command: str
@@ -201,4 +231,5 @@ def test_a_scheduler_that_dies_is_said_in_one_line(tmp_path: Path) -> None:
         own.close()
     errors = [line for line in said.splitlines() if line.startswith("error: ")]
     assert process.returncode == 2 and len(errors) == 1 and "Traceback" not in said, said
+    assert own.address in errors[0] and "does not answer any more" in errors[0] and "memory" not in errors[0]
     assert RunStore(tmp_path / "store").verify() == []

@@ -1,0 +1,123 @@
+"""A sweep that cannot go on ends, whatever its workers are at: with a result longer than a pipe holds half sent, say."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import BrokenExecutor, wait
+from pathlib import Path
+
+import pytest
+from small_campaign import ROOT
+
+from labsim.inference.processes import ProcessWorkers
+
+LONG = 1 << 20  # bytes of a result, many buffers of a pipe
+
+SWEEP = """
+import os, signal, sys, time
+from concurrent.futures import FIRST_COMPLETED, wait
+from labsim.inference.workers import open_executor
+
+def make(size, number, deadly):
+    if number == deadly:  # dies within its own result
+        import threading
+        threading.Timer({delay}, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    return bytes(size)
+
+if __name__ == "__main__":
+    with open_executor(2, None, 50, compile_first=False) as (executor, slots):
+        running = {{executor.submit(make, {size}, k, {deadly}) for k in range(50)}}
+        seen = 0
+        while running:
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                future.result()
+                seen += 1
+                if seen == {stop}:
+                    raise OSError(28, "No space left on device")
+    print("done")
+"""
+
+
+def run_sweep(
+    tmp_path: Path, *, stop: int = -1, deadly: int = -1, delay: float = 0.0
+) -> tuple[int, str, float]:
+    """Exit status, what was said, and seconds."""
+    script = tmp_path / "sweep.py"
+    script.write_text(SWEEP.format(size=LONG, stop=stop, deadly=deadly, delay=delay))
+    began = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return done.returncode, done.stderr, time.monotonic() - began
+
+
+@pytest.mark.parametrize("stop", [1, 2, 3, 5, 8])
+def test_an_error_within_a_sweep_ends_the_process(tmp_path: Path, stop: int) -> None:
+    """While the next results are under way, each of 1 MB."""
+    status, said, seconds = run_sweep(tmp_path, stop=stop)
+    assert status == 1 and "No space left" in said and seconds < 10.0
+
+
+@pytest.mark.parametrize("delay", [0.0, 1e-4, 3e-4, 1e-3])
+def test_a_worker_killed_within_its_result_ends_the_sweep(tmp_path: Path, delay: float) -> None:
+    status, said, seconds = run_sweep(tmp_path, deadly=7, delay=delay)
+    assert seconds < 10.0
+    assert status == 0 or "killed by SIGKILL" in said, said  # 0: the last one that it had to do was through
+
+
+def test_workers_do_the_calls_and_say_what_went_wrong() -> None:
+    workers = ProcessWorkers(2)
+    try:
+        calls = [workers.submit(pow, 2, k) for k in range(20)]
+        assert [call.result(60) for call in calls] == [2**k for k in range(20)]
+        with pytest.raises(ZeroDivisionError):
+            workers.submit(pow, 0, -1).result(60)
+        assert len(workers._processes) <= 2
+    finally:
+        workers.end()
+    assert all(process.exitcode is not None for process in workers._processes)
+    with pytest.raises(BrokenExecutor):
+        workers.submit(pow, 2, 2)
+
+
+def test_what_was_not_begun_is_cancelled() -> None:
+    workers = ProcessWorkers(1)
+    calls = [workers.submit(time.sleep, 60.0) for _ in range(3)]
+    time.sleep(0.5)
+    workers.end()
+    assert wait(calls, timeout=10).not_done == set()
+    assert isinstance(calls[0].exception(1) if not calls[0].cancelled() else BrokenExecutor(), BrokenExecutor)
+    assert calls[1].cancelled() and calls[2].cancelled()
+
+
+def list_children(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+@pytest.mark.parametrize("whom", ["main", "group"])
+def test_a_request_to_end_is_taken_as_ctrl_c(begin, tmp_path: Path, whom: str) -> None:
+    """Of the main process alone (kill), or of all (a batch system): one line, nothing of the machinery's, no orphans."""
+    soft = "--geometry planar --set material.bulk_modulus_Pa=4500 --spacing-um 125 --speed-m-s 0.3 --spacings 6".split()
+    process = begin("simulate", *soft, "-o", tmp_path / "out", "--workers", 2, "--quiet")
+    deadline = time.monotonic() + 60.0
+    while not list((tmp_path / "store").glob("??/*.h5")):
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.02)
+    children = list_children(process.pid)
+    began = time.monotonic()
+    (os.killpg if whom == "group" else os.kill)(process.pid, signal.SIGTERM)
+    _out, said = process.communicate(timeout=30)
+    assert time.monotonic() - began < 10.0
+    assert process.returncode == 143, said
+    assert said.splitlines() == ["error: stopped; start the same command again to go on from the stored runs"]
+    assert not [child for child in children if Path(f"/proc/{child}/cmdline").exists()]
