@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -11,7 +10,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..inference.calibrate import estimate_scatter, prepare, sample_fit, warn_unused_scans
+from ..inference.calibrate import (
+    estimate_scatter,
+    prepare,
+    sample_fit,
+    warn_of_range,
+    warn_unused_scans,
+)
 from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
@@ -79,6 +84,7 @@ class Diagnosis(Judgement):
     runs_reused: int
     wall: float
     warnings: tuple[str, ...]
+    doubts: int = 0  # how many of the warnings, the first ones, are about p_m itself: nobody should read it without them
 
 
 def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgement:
@@ -170,9 +176,9 @@ def diagnose_campaign(
     averaged = average_p_m(
         found.verdict, nominal, found.rivals, campaign.p_m_range, sampled=sampled, seed=seed
     )
-    low, high = campaign.p_m_range
-    if not low * 1.02 < math.exp(best.log_p_m) < high / 1.02:
-        warnings.append(f"p_m lies at the edge of its range, {math.exp(best.log_p_m):.4g} Pa")
+    doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
+    if best is not nominal:
+        doubts += [f"with {' + '.join(best.hypothesis)}: {text}" for text in warn_of_range(bench, best)]
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},
         confusable=list_confusable(found.screening),
@@ -186,7 +192,8 @@ def diagnose_campaign(
         runs_new=store.new,
         runs_reused=store.reused,
         wall=time.perf_counter() - began,
-        warnings=tuple(warnings),
+        warnings=(*doubts, *warnings),
+        doubts=len(doubts),
     )
 
 

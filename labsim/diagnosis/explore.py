@@ -49,11 +49,10 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
     fits : found so far.
     """
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    middle = min(max(nominal.log_p_m, low), high)  # an effect may have driven it out of its range
-    starts = [middle]
+    starts = [nominal.log_p_m]
     for shift in (math.log(REACH), -math.log(REACH)):
-        if low <= middle + shift <= high:
-            starts.append(middle + shift)
+        if low <= nominal.log_p_m + shift <= high:
+            starts.append(nominal.log_p_m + shift)
     found: dict[str, Fit] = {}
     top = max([nominal.evidence, *(fit.evidence for fit in fits)])
     for score in screening.scores:

@@ -27,7 +27,10 @@ from .settle import list_large, settle
 from .target import make_target
 from .workbench import Workbench
 
+LEANS = 2.0  # standard errors of ln p_m from an end of its range: one in twenty of the Gaussian is cut off from there on
+AT = 0.1  # the same, that nobody would tell from none
 LOST = 1e-6  # p value of a nominal fit that is not believed
+FIRST_START = 1414.0  # Pa, or what the range has nearest to it: laboratories report some kPa
 OTHER_STARTS = (500.0, 3500.0)  # Pa
 
 
@@ -46,6 +49,7 @@ class Calibration:
     runs_reused: int
     wall: float
     warnings: tuple[str, ...]
+    doubts: int = 0  # how many of the warnings, the first ones, are about p_m itself: nobody should read it without them
 
 
 def prepare(
@@ -80,7 +84,8 @@ def prepare(
     )
     bench.warnings += seen.warnings
     middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
-    nominal = fit_hypothesis(bench, (), (min(middle, math.log(1414.0)), {}))
+    start = max(min(middle, math.log(FIRST_START)), math.log(campaign.p_m_range[0]))
+    nominal = fit_hypothesis(bench, (), (start, {}))
     if (
         goodness_of_fit(nominal) < LOST
     ):  # a law so wrong that Gauss-Newton may have run away: from other strengths too
@@ -135,9 +140,12 @@ def calibrate(
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = goodness_of_fit(fit)
-    warnings = warn_unused_scans(bench)
+    doubts = warn_of_range(bench, fit)
     if p_value < 0.05:
-        warnings.append(f"the model does not explain the data (p = {p_value:.2g}); labsim diagnose asks why")
+        doubts.append(
+            f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
+            "diagnose asks why"
+        )
     return Calibration(
         campaign,
         bench,
@@ -149,8 +157,27 @@ def calibrate(
         store.new,
         store.reused,
         time.perf_counter() - began,
-        tuple(warnings),
+        (*doubts, *warn_unused_scans(bench)),
+        len(doubts),
     )
+
+
+def warn_of_range(bench: Workbench, fit: Fit) -> list[str]:
+    """A line where p_m is where its range, more than the data, puts it: at an end, or within LEANS standard errors of one.
+
+    A fit does not leave the range; its value, χ² and chain are those of the best p_m inside.
+    """
+    low, high = bench.campaign.p_m_range
+    sigma = math.sqrt(fit.covariance[0, 0])
+    for end in (low, high):
+        apart = abs(fit.log_p_m - math.log(end)) / sigma
+        if apart < LEANS:
+            where = "at" if apart < AT else f"{apart:.1f} standard errors from"
+            return [
+                f"the best p_m lies {where} the end of its range, {end:.4g} Pa of {low:.4g} to {high:.4g} Pa: the range, not "
+                "the data, says where it stops, and its error does not hold; widen material.p_m_range_Pa"
+            ]
+    return []
 
 
 def warn_unused_scans(bench: Workbench) -> list[str]:

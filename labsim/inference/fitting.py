@@ -17,7 +17,7 @@ from .drop_model import DropModel
 from .evidence import integrate_by_laplace
 from .likelihood import Linearised
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
-from .steps import Place, Solved, advance, hold, settle_nuisances, solve_at
+from .steps import Place, Solved, advance, hold, hold_strength, settle_nuisances, solve_at
 from .tangents import linearise_at
 from .workbench import Workbench, find_family
 
@@ -82,7 +82,7 @@ def fit_hypothesis(
     ]
     speeds = nuisances.scan_speeds if nuisances is not None else tuple(scan.stated for scan in bench.scans)
     values = {name: hold(bench, name, start[1].get(name, 0.0)) for name in hypothesis}
-    place = Place(start[0], values, models, speeds)
+    place = Place(hold_strength(bench, start[0]), values, models, speeds)
     best: Solved | None = None
     share, settled, calm = 1.0, False, False
     for iteration in range(iterations + 1):

@@ -17,7 +17,6 @@ from .workbench import Workbench
 
 SETTLED = 0.02  # of a standard deviation
 CALM = 0.05  # move of nuisances, as move_nuisances counts it
-BEYOND = 0.7  # of ln p_m, how far outside its range an estimate may stray
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,8 @@ def settle_nuisances(bench: Workbench, here: Solved, most: int) -> Solved:
 def advance(bench: Workbench, here: Solved, share: float) -> tuple[Place, bool]:
     """The next place, a share of the step on, and whether it is as good as the last."""
     place = here.place
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
     moved = share * _shorten(bench, stop_at_limits(bench, here)[0], place.values)
-    log_p_m = float(np.clip(place.log_p_m + np.clip(moved[0], -0.7, 0.7), low - BEYOND, high + BEYOND))
+    log_p_m = hold_strength(bench, place.log_p_m + float(np.clip(moved[0], -0.7, 0.7)))
     apart = [abs(log_p_m - place.log_p_m) / math.sqrt(here.covariance[0, 0])]
     values: dict[str, float] = {}
     for k, (name, before) in enumerate(place.values.items(), start=1):
@@ -119,8 +117,13 @@ def move_nuisances(
 
 
 def stop_at_limits(bench: Workbench, here: Solved) -> tuple[FloatArray, set[int]]:
-    """The step with amplitudes stopped at their limits, the others at their best with them; and the places of those stopped."""
+    """The step with p_m and amplitudes stopped at their limits, the others at their best with them; and the places of those
+    stopped."""
     step, stopped = here.step, set()
+    wanted = here.place.log_p_m + float(step[0])
+    if (held := hold_strength(bench, wanted)) != wanted:
+        step = step + here.covariance[0] / here.covariance[0, 0] * (held - wanted)
+        stopped.add(0)
     for k, (name, value) in enumerate(here.place.values.items(), start=1):
         parameter = bench.effects[name].amplitudes[0]
         low, high = parameter.limits
@@ -129,6 +132,12 @@ def stop_at_limits(bench: Workbench, here: Solved) -> tuple[FloatArray, set[int]
             step = step + here.covariance[k] / here.covariance[k, k] * back
             stopped.add(k)
     return step, stopped
+
+
+def hold_strength(bench: Workbench, log_p_m: float) -> float:
+    """ln p_m, inside its range."""
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    return min(max(log_p_m, low), high)
 
 
 def hold(bench: Workbench, name: str, amplitude: float) -> float:

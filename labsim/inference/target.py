@@ -69,7 +69,8 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
     bounds = [[math.log(p) for p in bench.campaign.p_m_range]]
     bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
     nulls = tuple(parameter.null for parameter in parameters)
-    misfit = measure_residual(residual, centre, fit.covariance)
+    at_end = any(math.isclose(fit.log_p_m, end, abs_tol=1e-9) for end in bounds[0])
+    misfit = measure_residual(residual, centre, fit.covariance, straight=at_end)
     return Target(names, nulls, parameters, misfit, np.array(bounds))
 
 

@@ -48,6 +48,7 @@ def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
 def campaign_calibration_lines(found: Calibration) -> str:
     p_m = summarise(found.posterior.samples("p_m_Pa"))
     lines = [
+        *_say_doubts(found),
         f"{found.campaign.name}: p_m = {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa "
         f"(90 %: {p_m['q05'] / 1e3:.3f} to {p_m['q95'] / 1e3:.3f} kPa)",
     ]
@@ -61,7 +62,12 @@ def campaign_calibration_lines(found: Calibration) -> str:
         f"  R-hat {found.posterior.r_hat:.3f}, {found.posterior.ess:.0f} independent samples; "
         f"{found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s",
     ]
-    return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings)])
+    return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings[found.doubts :])])
+
+
+def _say_doubts(found: Calibration | Diagnosis) -> list[str]:
+    """The warnings that stand before the result: who reads the first line only reads these."""
+    return [f"warning: {text}" for text in found.warnings[: found.doubts]]
 
 
 def _quantiles(posterior: Posterior, name: str) -> dict[str, float]:
@@ -198,7 +204,7 @@ def say_gain(gain: Gain) -> str:
 
 
 def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
-    lines = [say_verdict(found), ""]
+    lines = [*_say_doubts(found), say_verdict(found), ""]
     lines.append("  probability  cause")
     worth = [each for each in found.verdict.probabilities if each[1] >= 5e-4][:6]
     for hypothesis, probability in worth:
@@ -225,7 +231,7 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
             f"  next experiment: {suggestions[0].change} ({suggestions[0].information_bits:.2f} bits)"
         )
     lines.append(f"  {found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s")
-    return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings)])
+    return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings[found.doubts :])])
 
 
 def extended_model(found: Diagnosis) -> Model:

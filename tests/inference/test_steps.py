@@ -98,3 +98,31 @@ def test_an_amplitude_stopped_at_its_limit_leaves_p_m_at_its_best_there(monkeypa
     exact = math.log(total / (high - low)) - 12 * math.log(sigma * math.sqrt(2 * math.pi))
     # Laplace's formula takes the prior at the limit for that over the tail, and its curvature with the data's
     assert fit.evidence == pytest.approx(exact, abs=0.1)
+
+
+def test_p_m_stopped_at_its_end_leaves_an_amplitude_at_its_best_there(monkeypatch):
+    """The least squares under the bound, in closed form; and the evidence, by quadrature."""
+    rng = np.random.default_rng(7)
+    low, high = (math.log(p) for p in (300.0, 6000.0))
+    sigma = 0.2
+    tangents = rng.standard_normal((15, 2)) @ np.array([[1.0, 0.7], [0.0, 0.7]])
+    data = tangents @ np.array([0.4, 0.3]) + sigma * rng.standard_normal(15)  # 0.4 beyond the end
+
+    def predict(log_p_m, amplitude):
+        return tangents @ np.array([log_p_m - high, amplitude]), tangents
+
+    bench = a_bench(monkeypatch, predict, data, sigma)
+    fit = fitting.fit_hypothesis(bench, ("effect",), (high - 0.6, {"effect": 0.0}))
+    parameter = bench.effects["effect"].amplitudes[0]
+    column = tangents[:, 1]
+    best = float(column @ data / (column @ column + sigma**2 / parameter.scale**2))
+    assert fit.log_p_m == pytest.approx(high, abs=1e-9)
+    assert fit.values["effect"] == pytest.approx(best, abs=1e-6)
+
+    def density(amplitude, moved):
+        left = data - tangents @ np.array([moved, amplitude])
+        return math.exp(-0.5 * left @ left / sigma**2 + float(parameter.log_prior(amplitude)))
+
+    total, _ = dblquad(density, low - high, 0.0, -6.0, 6.0, epsabs=1e-14, epsrel=1e-6)
+    exact = math.log(total / (high - low)) - 15 * math.log(sigma * math.sqrt(2 * math.pi))
+    assert fit.evidence == pytest.approx(exact, abs=0.1)
