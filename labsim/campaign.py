@@ -23,6 +23,7 @@ from .campaign_tables import (
 )
 from .errors import CampaignError, MeasurementError
 from .records import (
+    STANDARD_GRAVITY,
     Camera,
     Campaign,
     Drop,
@@ -54,7 +55,7 @@ def read_campaign(folder: Path | str) -> Campaign:
     sample = read_sample(document.table("sample"))
     material, p_m_range = read_material(document.table("material"), sample)
     model = document.table("model", required=False)
-    gravity = model.number("gravity_m_s2", 0.0, 30.0, default=9.81)
+    gravity = model.number("gravity_m_s2", 0.0, 30.0, default=STANDARD_GRAVITY)
     geometry = model.choice("geometry", ("axisymmetric", "planar"), "axisymmetric")
     planar = read_planar(document.table("planar", required=False))
     source = _read_source(document)

@@ -15,6 +15,10 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
+STANDARD_GRAVITY = (
+    9.81  # m/s^2, of every free fall, and of the nominal model where a campaign says nothing else
+)
+
 Tip = Literal["hemisphere", "sphere", "cylinder"]
 
 
@@ -71,6 +75,11 @@ class Projectile:
     mass: float  # kg (planar: kg per metre of cylinder)
     mass_sigma: float = 0.0
     length: float = 0.0  # m, of the whole rod; 0 where it does not matter
+
+    @property
+    def simulated(self) -> Projectile:
+        """The same without what no simulation depends on: drops of equal ones share their runs."""
+        return replace(self, mass_sigma=0.0, length=0.0)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any
 
 from ..ct.reduce import reduce_scan
 from ..errors import LabsimError
-from ..inference.observe import STANDARD_GRAVITY, read_observed_track
-from ..records import Campaign, Drop, Measured, Scan
+from ..inference.observe import read_observed_track
+from ..records import STANDARD_GRAVITY, Campaign, Drop, Measured, Scan
 from ..video import open_frames
 from ..video.curve import fit_deceleration
 from .options import Progress

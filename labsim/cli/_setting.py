@@ -21,7 +21,7 @@ from ..effects import (
 from ..errors import CampaignError, LabsimError
 from ..inference.planar import planar_setting
 from ..inference.published import impact_speed
-from ..records import Campaign, Drop, Material, Projectile
+from ..records import STANDARD_GRAVITY, Campaign, Drop, Material, Projectile
 from ..sph import DropSetting
 from ..tables import Table
 
@@ -117,7 +117,7 @@ def _choose_drop(read: Campaign | None, name: str | None) -> Drop | None:
 def _dust(read: Campaign | None) -> tuple[Material, float, float, float]:
     """Material, filling factor, density of the monomers, gravity."""
     if read is None:
-        return Material(), 0.15, 2000.0, 9.81
+        return Material(), 0.15, 2000.0, STANDARD_GRAVITY
     return read.material, read.sample.filling_factor, read.sample.monomer_density, read.gravity
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from .. import video
 from ..errors import LabsimError
-from ..records import DecelerationCurve, Measured, Track
+from ..records import STANDARD_GRAVITY, DecelerationCurve, Measured, Track
 from ..tracking import Request, Tracked, make_camera
 
 
@@ -143,7 +143,13 @@ def tell(summary: dict[str, Any], curve: DecelerationCurve | None, folder: Path,
             lines.append(line("rebound speed", curve.rebound_speed, 1e3, "mm/s", 1))
         if curve.apparent_gravity is not None:
             lines.append(
-                line("apparent gravity", curve.apparent_gravity, 1.0, "m/s² (check of the scales: 9.81)", 2)
+                line(
+                    "apparent gravity",
+                    curve.apparent_gravity,
+                    1.0,
+                    f"m/s² (check of the scales: {STANDARD_GRAVITY})",
+                    2,
+                )
             )
     if summary["pixel_size_m"] is not None:
         pixel = Measured(summary["pixel_size_m"], summary["pixel_size_m_sigma"])

@@ -17,7 +17,7 @@ from ..inference.calibrate import (
     warn_of_range,
     warn_unused_scans,
 )
-from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit
+from ..inference.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
 from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
@@ -26,7 +26,7 @@ from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
-from .free_law import FAILED, fit_hats, is_wanted
+from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, Verdict, judge
 from .pairs import confirm_pairs, return_to_singles, settle_leading
@@ -105,7 +105,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     rivals = return_to_singles(bench, rivals, pairs) + pairs
     leading = find_leading(rivals, nominal)
     predicted = 1.0
-    if p_value < FAILED and rivals:
+    if p_value < REJECTED and rivals:
         predicted = check_prediction(bench, leading, np.random.default_rng(seed))
     if is_wanted(p_value, rivals, unknown.evidence, predicted):
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))

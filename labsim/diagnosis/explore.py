@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..inference.fitting import Fit, fit_hypothesis, goodness_of_fit, with_probes
+from ..inference.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, goodness_of_fit, with_probes
 from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from .screen import Screening
@@ -21,8 +21,6 @@ from .shapes import cause
 
 REACH = 2.5  # factor on p_m
 EXPLORED = ("material", "contact")  # kinds that p_m can make up for; samples are seen in the scans
-FAILED = 0.05  # p value of the nominal model below which it is worth while
-EXPLAINED = 0.01  # p value of a fit above which nothing more is looked for
 PROMISING = 3.0  # ln Bayes factor of the screening from which it is
 NOWHERE = 2e4  # ln likelihood behind it at which one is not followed at all
 HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed to its end
@@ -35,10 +33,10 @@ def is_open(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Scre
     However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another.
     """
     best = screening.scores[0].log_bayes if screening.scores else -math.inf
-    if best <= PROMISING and goodness_of_fit(nominal) >= FAILED:
+    if best <= PROMISING and goodness_of_fit(nominal) >= DOUBTFUL:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    if found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < EXPLAINED:
+    if found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < REJECTED:
         return True
     return bench.effects[found.hypothesis[0]].kind in EXPLORED
 

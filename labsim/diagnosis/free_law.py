@@ -19,7 +19,7 @@ from scipy.stats import truncnorm
 
 from ..inference.blocks import Block
 from ..inference.evidence import log_share_inside
-from ..inference.fitting import Fit, goodness_of_fit
+from ..inference.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
 from ..inference.likelihood import solve_globals
 from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
 from ..inference.steps import move_nuisances
@@ -29,8 +29,6 @@ from ..records import FloatArray
 from .hats import FreeLaw, list_laws, make_hats
 from .screen import has_runs
 
-FAILED = 0.01  # p value of the nominal model below which its runs are made: a campaign without a fault costs nothing more
-EXPLAINED = 0.05  # p value of the best listed cause above which they are not, if it also is
 AHEAD = 10.0  # so much, in ln evidence, before a law that has no place in the equations
 # of the unit. A law of 3 to 24 % all along the way moves depths by 1 to 8 %; one hat is a fourth of the way
 SIZES = (0.1, 0.2, 0.4, 0.8)
@@ -99,11 +97,11 @@ def is_wanted(p_value: float, rivals: Sequence[Fit], without_place: float, predi
     """Whether a law in the equations can matter: the nominal model fails, and no listed cause fits, predicts held-out drops
     (``predicted``, p value of the best) and stands far ahead of ``without_place``, ln evidence of the laws that cost no runs."""
     best = max(rivals, key=lambda fit: fit.evidence, default=None)
-    if p_value >= FAILED:
+    if p_value >= REJECTED:
         return False
     if best is None or best.evidence < without_place + AHEAD:
         return True
-    return min(goodness_of_fit(best), predicted) < EXPLAINED
+    return min(goodness_of_fit(best), predicted) < DOUBTFUL
 
 
 def fit_hats(bench: Workbench, fit: Fit) -> Tangents:

@@ -15,7 +15,7 @@ import numpy as np
 from ..inference.curves import FRACTIONS
 from ..inference.fitting import Fit
 from ..inference.workbench import Workbench
-from ..records import FloatArray
+from ..records import STANDARD_GRAVITY, FloatArray
 
 WORTHWHILE = 0.01  # bits below which an experiment is not suggested
 SMALLEST = 0.005  # probability below which a hypothesis is left out
@@ -49,7 +49,7 @@ def suggest(
             found.append(
                 Suggestion(
                     f"one more drop with the {2e3 * p.tip_radius:.3g} mm tip of {p.mass * 1e6:.3g} mg at {speed:.2f} m/s "
-                    f"(height {speed**2 / 2 / 9.81 * 1e3:.1f} mm)",
+                    f"(height {speed**2 / 2 / STANDARD_GRAVITY * 1e3:.1f} mm)",
                     round(bits, 3),
                 )
             )

@@ -17,14 +17,13 @@ from typing import Literal
 import numpy as np
 
 from ..errors import EffectError
-from ..records import Campaign, FloatArray, Material, Sample, Tip
+from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Material, Projectile, Sample, Tip
 from ..sph import DropSetting
 from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
 
 Kind = Literal["material", "sample", "contact", "projectile", "measurement", "numerics"]
 KINDS: tuple[Kind, ...] = ("material", "sample", "contact", "projectile", "measurement", "numerics")
 OBSERVABLES = ("penetration_depth", "stopping_time", "compacted_volume")
-STOPPING_GRAVITY = 9.81  # m/s^2, that drops fall with, whatever the nominal model holds
 
 
 @dataclass(frozen=True)
@@ -236,31 +235,42 @@ def list_places(campaign: Campaign) -> dict[str, Place]:
 
 def list_thrown(campaign: Campaign) -> list[tuple[float, float, float]]:
     """Tip radius (m), mass (kg) and expected speed at contact (m/s) of every drop and scan, from what is stated."""
-    thrown = []
+    return [(each.tip_radius, each.mass, speed) for each, speed in _list_impacts(campaign)]
+
+
+def _list_impacts(campaign: Campaign) -> list[tuple[Projectile, float]]:
+    impacts = []
     for drop in campaign.drops:
-        speed = math.sqrt(2.0 * STOPPING_GRAVITY * drop.height.value) if drop.height else 0.0
+        speed = math.sqrt(2.0 * STANDARD_GRAVITY * drop.height.value) if drop.height else 0.0
         if drop.published and drop.published.impact_speed:
             speed = drop.published.impact_speed.value
-        thrown.append((drop.projectile.tip_radius, drop.projectile.mass, speed))
+        impacts.append((drop.projectile, speed))
     for scan in (*campaign.scans, *campaign.published_scans):
-        thrown.append((scan.projectile.tip_radius, scan.projectile.mass, scan.speed.value))
-    return thrown
+        impacts.append((scan.projectile, scan.speed.value))
+    return impacts
+
+
+def _list_settings(campaign: Campaign, p_m: float) -> list[DropSetting]:
+    """Every drop and scan as it is simulated in dust of one strength (Pa)."""
+    material = campaign.material.replace(p_m=p_m)
+    return [
+        DropSetting(projectile.simulated, speed, material, geometry=campaign.geometry)
+        for projectile, speed in _list_impacts(campaign)
+    ]
 
 
 def deepest_expected(campaign: Campaign) -> float:
-    """Depth (m) that the fastest and heaviest projectile is expected to reach, by D = 8e-4 m v/A (Güttler et al. 2009)."""
-    return max(8e-4 * mass * speed / (math.pi * radius**2) for radius, mass, speed in list_thrown(campaign))
+    """Depth (m) that the fastest and heaviest projectile is expected to reach in dust of the nominal strength."""
+    return max(setting.expected_depth for setting in _list_settings(campaign, campaign.material.p_m))
 
 
 def deepest_dust(campaign: Campaign) -> float:
-    """Depth (m) of the dust that simulations of this campaign hold at most; gradients must stay physical down to there."""
+    """Depth (m) of the dust that simulations of this campaign hold at most, which is where its strength is least; gradients
+    must stay physical down to there."""
     if campaign.geometry == "planar":
         box = campaign.planar
         return max(box.box_depth * radius / box.box_radius for radius, _, _ in list_thrown(campaign))
-    return max(
-        max(6 * radius, 3 * radius + 1.5 * 8e-4 * mass * speed / (math.pi * radius**2))
-        for radius, mass, speed in list_thrown(campaign)
-    )
+    return max(setting.extent[1] for setting in _list_settings(campaign, campaign.p_m_range[0]))
 
 
 __all__ = [

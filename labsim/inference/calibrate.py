@@ -17,7 +17,7 @@ from ..errors import InferenceError
 from ..records import Campaign
 from .drop_terms import Terms
 from .error_sizes import integrate_sizes
-from .fitting import Fit, fit_hypothesis, goodness_of_fit
+from .fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
 from .measure import Measurements, measure
 from .open_workbench import open_workbench
 from .posterior import Posterior, sample
@@ -141,7 +141,7 @@ def calibrate(
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = goodness_of_fit(fit)
     doubts = warn_of_range(bench, fit)
-    if p_value < 0.05:
+    if p_value < DOUBTFUL:
         doubts.append(
             f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
             "diagnose asks why"

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import Instrument
-from ..records import FloatArray
+from ..records import STANDARD_GRAVITY, FloatArray
 from .drop_model import FREE, SPEED_WIDTH, DropModel
-from .observe import STANDARD_GRAVITY
 
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error

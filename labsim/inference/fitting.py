@@ -23,6 +23,9 @@ from .workbench import Workbench, find_family
 
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
+# p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
+# looked for where that costs nothing; below the second it fails, and runs are made to find out why
+DOUBTFUL, REJECTED = 0.05, 0.01
 LOWER = 3.0  # ln likelihood that a step may lose: its aim, the least χ², lies that far from the top or less
 MOST_HALVED = 3  # times a step is
 MOST_NUISANCES = 3  # times nuisances alone are moved

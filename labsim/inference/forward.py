@@ -13,12 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..records import FloatArray
+from ..records import STANDARD_GRAVITY, FloatArray
 from .curves import decode_depth, decode_rate
 from .grid import STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
-
-STANDARD_GRAVITY = 9.81
-
 
 Changes = dict[float, dict[float, FloatArray]]
 

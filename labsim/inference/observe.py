@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MeasurementError
-from ..records import Campaign, Drop, FloatArray, Track
+from ..records import STANDARD_GRAVITY, Campaign, Drop, FloatArray, Track
 from ..video.track_file import read_track
 
-STANDARD_GRAVITY = 9.81  # m/s^2, of every free fall, whatever the nominal model holds
 OUTLIER = 5.0  # standard deviations from the neighbours
 WINDOW = 4  # neighbours on either side
 MARGIN = 4  # frames kept after the depth has stopped growing
@@ -32,7 +31,6 @@ class ObservedDrop:
     contact_time: float  # s, starting value
     impact_speed: float  # m/s, starting value on the stated scales
     rejected: int
-    sequence_fraction: float
 
     @property
     def name(self) -> str:
@@ -44,7 +42,7 @@ class ObservedDrop:
         return self.drop.camera.pixel_size
 
 
-def observe_drop(drop: Drop, track: Track, sequence_fraction: float) -> ObservedDrop:
+def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
     """Depths on the stated scale up to the stop, outliers removed. Raises MeasurementError where nothing is left."""
     assert drop.camera is not None
     pixel = drop.camera.pixel_size
@@ -74,7 +72,6 @@ def observe_drop(drop: Drop, track: Track, sequence_fraction: float) -> Observed
         contact_time=contact,
         impact_speed=speed,
         rejected=int(good.sum() - row.size),
-        sequence_fraction=sequence_fraction,
     )
 
 
@@ -119,13 +116,6 @@ def _fit_free_fall(time: FloatArray, depth: FloatArray) -> tuple[float, float]:
     return middle + root, slope + STANDARD_GRAVITY * root
 
 
-def sequence_fractions(drops: tuple[Drop, ...]) -> dict[str, float]:
-    """Place of each drop in the order they were made, -0.5 for the first to +0.5 for the last."""
-    order = sorted(drops, key=lambda drop: drop.sequence)
-    span = max(len(order) - 1, 1)
-    return {drop.name: place / span - 0.5 for place, drop in enumerate(order)}
-
-
 def read_observed_track(drop: Drop) -> Track:
     """The track of a drop, from its file or from its video."""
     assert drop.camera is not None and drop.record.path is not None
@@ -141,14 +131,13 @@ def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
 
     Raises MeasurementError where none does: the first one's.
     """
-    places = sequence_fractions(campaign.drops)
     seen: list[ObservedDrop] = []
     failures: list[tuple[str, MeasurementError]] = []
     for drop in campaign.drops:
         if drop.record.kind == "summary":
             continue
         try:
-            seen.append(observe_drop(drop, read_observed_track(drop), places[drop.name]))
+            seen.append(observe_drop(drop, read_observed_track(drop)))
         except MeasurementError as error:
             failures.append((drop.name, error))
     if failures and not seen:

@@ -45,24 +45,21 @@ def open_workbench(
     if not drops:
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
-    members: dict[tuple, list[ObservedDrop]] = {}
+    members: dict[Projectile, list[ObservedDrop]] = {}
     for drop in drops:
-        p = drop.drop.projectile
-        members.setdefault((p.tip, p.tip_radius, round(p.mass, 12)), []).append(drop)
+        members.setdefault(drop.drop.projectile.simulated, []).append(drop)
     tables, models = [], []
-    for group in members.values():
+    for projectile, group in members.items():
         nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
-        projectile = group[0].drop.projectile
-        stated = type(projectile)(projectile.tip, projectile.tip_radius, projectile.mass)
-        families.append(Family(stated, nodes, False, few))
+        families.append(Family(projectile, nodes, False, few))
         table = ResponseTable(np.log(nodes), few)
         tables.append(table)
         models += [make_drop_model(drop, table) for drop in group]
     scan_models = []
-    for (tip, radius, mass), group in _group_scans(scans).items():
-        nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in group], SCAN_MARGIN)
-        families.append(Family(Projectile(tip, radius, mass), nodes, True, few))
-        for scan in group:
+    for projectile, scanned in _group_scans(scans).items():
+        nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
+        families.append(Family(projectile, nodes, True, few))
+        for scan in scanned:
             scan_models.append(ScanModel(scan, ResponseTable(np.log(nodes), few)))
     resolved, reasons = {}, {}
     for name, effect in effects.items():
@@ -117,9 +114,8 @@ def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float
     return nodes, few_positions(nodes, slowest, fastest)
 
 
-def _group_scans(scans: Sequence[ObservedScan]) -> dict[tuple, list[ObservedScan]]:
-    groups: dict[tuple, list[ObservedScan]] = {}
+def _group_scans(scans: Sequence[ObservedScan]) -> dict[Projectile, list[ObservedScan]]:
+    groups: dict[Projectile, list[ObservedScan]] = {}
     for scan in scans:
-        p = scan.scan.projectile
-        groups.setdefault((p.tip, p.tip_radius, p.mass), []).append(scan)
+        groups.setdefault(scan.scan.projectile.simulated, []).append(scan)
     return groups

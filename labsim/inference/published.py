@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import InferenceError
-from ..records import Campaign, Drop, Measured
+from ..records import STANDARD_GRAVITY, Campaign, Drop, Measured
 from .planar import expected_raw_depth
 
 FIGURE_KINDS = ("depth", "stopping_time")
@@ -72,4 +72,4 @@ def impact_speed(drop: Drop, campaign: Campaign) -> float:
     if drop.published is not None and drop.published.impact_speed is not None:
         return drop.published.impact_speed.value
     assert drop.height is not None
-    return math.sqrt(2.0 * (campaign.gravity or 9.81) * drop.height.value)
+    return math.sqrt(2.0 * (campaign.gravity or STANDARD_GRAVITY) * drop.height.value)

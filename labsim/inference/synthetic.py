@@ -15,12 +15,12 @@ import numpy as np
 
 from ..ct.reduce import ReducedScan
 from ..effects import Instrument, list_places
-from ..records import Drop, Track
+from ..records import STANDARD_GRAVITY, Drop, Track
 from ..sph.particles import initial_filling_factor
 from .forward import Instant, predict_depth
 from .measure import Measurements
-from .observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
-from .truth import DRIFT, Hidden, TruthTable, bare
+from .observe import observe_drop
+from .truth import DRIFT, Hidden, TruthTable
 from .undisturbed import UndisturbedDust
 
 AFTER_STOP = 1.1  # frames kept, in stopping times
@@ -70,21 +70,21 @@ def measure_hidden(
     Raises SimulationError where its runs are missing.
     """
     campaign = truth.campaign
-    places, fractions = list_places(campaign), sequence_fractions(campaign.drops)
+    places = list_places(campaign)
     drops = []
     for drop in campaign.drops:
         place, shift = places[drop.name], laboratory.samples * rng.standard_normal()
         if DRIFT in hidden.effects:
-            plain = truth.setting(bare(drop.projectile), 0.5, hidden.p_m)
+            plain = truth.setting(drop.projectile.simulated, 0.5, hidden.p_m)
             changed = truth.apply({DRIFT: hidden.effects[DRIFT]}, plain, place)
             shift += math.log(changed.material.p_m / hidden.p_m)
         instrument = truth.instrument(hidden, place)
         track = _film(truth, hidden, drop, instrument, math.log(hidden.p_m) + shift, rng, laboratory)
-        drops.append(observe_drop(drop, track, fractions[drop.name]))
+        drops.append(observe_drop(drop, track))
     dust = []
     for scan in campaign.scans[:scans]:
         depth = np.arange(2 * ROW_STEP, ROW_DEPTH, ROW_STEP)
-        setting, place = truth.setting(bare(scan.projectile), 0.5, hidden.p_m), places[scan.name]
+        setting, place = truth.setting(scan.projectile.simulated, 0.5, hidden.p_m), places[scan.name]
         setting, instrument = truth.apply(hidden.effects, setting, place), truth.instrument(hidden, place)
         level = instrument.stated_filling_factor(initial_filling_factor(setting, depth))
         seen = level + laboratory.dust * rng.standard_normal(depth.size)

@@ -16,13 +16,12 @@ import numpy as np
 from ..ct.reduce import ReducedScan
 from ..effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
 from ..errors import SimulationError
-from ..records import Campaign, FloatArray, Projectile, Scan
+from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Projectile, Scan
 from ..sph import DropRun, DropSetting
 from .curves import encode_run
 from .forward import ResponseTable
 from .grid import set_nominal_drop
 from .nodes import place_strength
-from .observe import STANDARD_GRAVITY
 from .runs import Progress, RunStore
 from .scans import see_dust
 
@@ -136,7 +135,7 @@ class TruthTable:
                     partial(_encode_map, each, blur),
                 )
                 for each in self.templates
-                if bare(each.scan.projectile) == projectile
+                if each.scan.projectile.simulated == projectile
                 for blur in blurs
             ]
             families.append(Family(projectile, speeds, True, seen))
@@ -144,7 +143,7 @@ class TruthTable:
 
     def code(self, hidden: Hidden, projectile: Projectile, log_p_m: float, log_speed: float) -> FloatArray:
         """Code of one drop of a truth."""
-        return self._interpolate(self.tables[bare(projectile)], hidden, log_p_m, log_speed)
+        return self._interpolate(self.tables[projectile.simulated], hidden, log_p_m, log_speed)
 
     def map_code(self, hidden: Hidden, scan: Scan, log_p_m: float, log_speed: float) -> FloatArray:
         """(ln D, filling factor on all cells) of one scan of a truth, its dust in the frame of the template."""
@@ -196,7 +195,7 @@ class TruthTable:
             assert drop.height is not None
             fall = math.sqrt(2 * STANDARD_GRAVITY * drop.height.value)
             slack = 1 + 1.5 * drop.height.sigma / drop.height.value
-            speeds.setdefault(bare(drop.projectile), []).extend([fall * slack, fall / slack])
+            speeds.setdefault(drop.projectile.simulated, []).extend([fall * slack, fall / slack])
         return {p: _own_nodes(min(v), max(v)) for p, v in speeds.items()}
 
     def _scan_families(self) -> dict[Projectile, tuple[float, ...]]:
@@ -204,7 +203,7 @@ class TruthTable:
         for template in self.templates:
             speed = template.scan.speed
             reach = (speed.value - 1.5 * speed.sigma, speed.value + 1.5 * speed.sigma)
-            speeds.setdefault(bare(template.scan.projectile), []).extend(reach)
+            speeds.setdefault(template.scan.projectile.simulated, []).extend(reach)
         return {p: _own_nodes(min(v), max(v)) for p, v in speeds.items()}
 
     def _costly(self, hidden: Hidden) -> Effects:
@@ -266,10 +265,6 @@ def _say(effects: Effects) -> str:
         " ".join([name, *(f"{key}={value:.6g}" for key, value in sorted(effects[name].items()))])
         for name in sorted(effects)
     )
-
-
-def bare(projectile: Projectile) -> Projectile:
-    return Projectile(projectile.tip, projectile.tip_radius, projectile.mass)
 
 
 def _own_nodes(slowest: float, fastest: float) -> tuple[float, ...]:

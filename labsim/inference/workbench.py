@@ -209,8 +209,6 @@ class Workbench:
 def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: bool) -> int:
     """Number of the family with this projectile."""
     for number, family in enumerate(families):
-        f = family.projectile
-        same = (f.tip, f.tip_radius) == (projectile.tip, projectile.tip_radius)
-        if same and family.is_scan == is_scan and math.isclose(f.mass, projectile.mass, rel_tol=1e-9):
+        if (family.projectile, family.is_scan) == (projectile.simulated, is_scan):
             return number
     raise InferenceError("simulation", "projectile", "has no runs")

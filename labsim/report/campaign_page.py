@@ -9,6 +9,7 @@ from typing import Any
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion
 from ..inference.calibrate import Calibration
+from ..inference.fitting import DOUBTFUL
 from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
@@ -60,7 +61,7 @@ def write_campaign_page(
         (
             "p-value of the nominal model",
             say_p_value(found.p_value),
-            "it does not explain the data" if found.p_value < 0.05 else "it explains the data",
+            "it does not explain the data" if found.p_value < DOUBTFUL else "it explains the data",
         ),
         (
             "most probable",
@@ -127,7 +128,7 @@ def write_calibration_page(
     label = next(iter(views[0].simulated))
     posteriors = [(label, found.posterior)]
     q = summary["p_m_Pa"]
-    explains = found.p_value >= 0.05
+    explains = found.p_value >= DOUBTFUL
     sentence = (
         f"p_m = {q['q50'] / 1e3:.2f} kPa, 90 % between {q['q05'] / 1e3:.2f} and {q['q95'] / 1e3:.2f} kPa, from "
         f"{len(views)} drops; the simulation {'explains' if explains else 'does not explain'} them "

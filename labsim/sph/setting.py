@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from ..errors import SimulationError
-from ..records import Material, Projectile
+from ..records import STANDARD_GRAVITY, Material, Projectile
 
 LOOSEST = 0.005  # of φ over φ1, that a gradient leaves
 LEAST_GRADED = 3.0  # tip radii that a falling φ0 must fall through before it stays as it is
@@ -45,7 +45,7 @@ class DropSetting:
     material: Material
     filling_factor: float = 0.15
     monomer_density: float = 2000.0  # kg/m^3
-    gravity: float = 9.81  # m/s^2
+    gravity: float = STANDARD_GRAVITY  # m/s^2
     geometry: Literal["planar", "axisymmetric"] = "axisymmetric"
     spacing: float = 6.25e-5  # m
     duration: float = 0.05  # s, the run ends here at the latest
@@ -71,18 +71,26 @@ class DropSetting:
         return replace(self, **changes)  # type: ignore[arg-type]
 
     @property
+    def expected_depth(self) -> float:
+        """Depth (m) that the tip may reach: a little less than D = 8e-4 m v / A, in m, kg and s (Güttler et al. 2009), for dust
+        of 1300 Pa or more, deeper in softer dust with the third root of its strength. It only sizes boxes."""
+        radius = self.projectile.tip_radius
+        area = 2 * radius if self.geometry == "planar" else math.pi * radius**2
+        strength = max(self.material.p_m * min(self.material.shear_factor, 1.0), 1.0)
+        # softer dust lets it through to where the bottom would be felt
+        return float(
+            7e-4 * self.projectile.mass * self.impact_speed / area * max(1.0, 1300.0 / strength) ** (1 / 3)
+        )
+
+    @property
     def extent(self) -> tuple[float, float]:
         """Width (half width in r-z) and depth of the dust that is simulated, m, whole numbers of spacings."""
         radius = self.projectile.tip_radius
         planar = self.geometry == "planar"
-        area = 2 * radius if planar else math.pi * radius**2
-        expected = 7e-4 * self.projectile.mass * self.impact_speed / area
-        # softer dust lets it through to where the bottom would be felt
-        expected *= max(1.0, 1300.0 / max(self.material.p_m * min(self.material.shear_factor, 1.0), 1.0)) ** (
-            1 / 3
-        )
         width = self.width if self.width is not None else (16 * radius if planar else 6 * radius)
-        depth = self.depth if self.depth is not None else max(6 * radius, 3 * radius + 1.5 * expected)
+        depth = (
+            self.depth if self.depth is not None else max(6 * radius, 3 * radius + 1.5 * self.expected_depth)
+        )
         cells = 2 * round(width / self.spacing / 2) if planar else round(width / self.spacing)
         return cells * self.spacing, round(depth / self.spacing) * self.spacing
 

@@ -160,7 +160,7 @@ def _describe(
     gravity = fit_gravity(time[use], depth[use], error[use], t0, scale)
     if gravity is not None and abs(gravity.value - STANDARD_GRAVITY) > 3 * gravity.sigma:
         warnings.append(
-            f"free flight falls with {gravity.value:.2f} ± {gravity.sigma:.2f} m/s² instead of 9.81: "
+            f"free flight falls with {gravity.value:.2f} ± {gravity.sigma:.2f} m/s² instead of {STANDARD_GRAVITY}: "
             "check pixel scale and frame rate (g ∝ pixel · rate²)"
         )
     residual = np.full(len(track.frame), np.nan)

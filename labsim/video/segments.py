@@ -19,9 +19,8 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.optimize import least_squares
 
-from ..records import FloatArray
+from ..records import STANDARD_GRAVITY, FloatArray
 
-STANDARD_GRAVITY = 9.81
 GRAVITY_PRIOR_SIGMA = 3.0  # m/s^2; only steadies v0 where few frames lie before the contact
 
 

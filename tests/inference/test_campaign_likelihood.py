@@ -14,10 +14,10 @@ from labsim.inference.forward import Instant, ResponseTable, predict_depth, pred
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.likelihood import solve_globals
 from labsim.inference.nodes import enclosing_nodes
-from labsim.inference.observe import STANDARD_GRAVITY, observe_drop, sequence_fractions
+from labsim.inference.observe import observe_drop
 from labsim.inference.posterior import measure_residual, sample
 from labsim.inference.scans import Block
-from labsim.records import Camera, Drop, Material, Measured, Projectile, Record, Track
+from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
 
 
@@ -147,17 +147,12 @@ def synthetic_track(drop, rng, outliers=()):
 def test_free_fall_gives_contact_and_speed_and_outliers_go():
     drop = make_drop()
     track = synthetic_track(drop, np.random.default_rng(3), outliers=(20, 21, 60))
-    observed = observe_drop(drop, track, 0.0)
+    observed = observe_drop(drop, track)
     assert not set(observed.time) & set(track.time[[20, 21, 60]])
     assert observed.rejected <= 3 + 1  # a good frame in a hundred may go with them
     assert observed.contact_time == pytest.approx(0.0081, abs=1e-5)
     assert observed.impact_speed == pytest.approx(0.785, rel=2e-3)
     assert observed.time.max() < 0.0081 + 2.6e-3  # what follows the stop is left out
-
-
-def test_places_in_the_sequence():
-    drops = tuple(replace(make_drop(), name=f"D{k}", sequence=s) for k, s in enumerate((3, 1, 2)))
-    assert sequence_fractions(drops) == {"D0": 0.5, "D1": -0.5, "D2": 0.0}
 
 
 def test_globals_are_generalised_least_squares():

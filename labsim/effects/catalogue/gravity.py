@@ -1,6 +1,7 @@
 """The nominal model leaves gravity out; here it acts on projectile and dust, which starts in hydrostatic balance."""
 
 from labsim.effects import Normal, Parameter
+from labsim.records import STANDARD_GRAVITY
 
 title = "Gravity is left out of the nominal model"
 kind = "projectile"
@@ -10,8 +11,8 @@ parameters = (
         "m/s^2",
         null=0.0,
         limits=(0.0, 20.0),
-        prior=Normal(9.81, 1.0),
-        step=9.81,
+        prior=Normal(STANDARD_GRAVITY, 1.0),
+        step=STANDARD_GRAVITY,
         symbol="g",
         text="If gravity is what is missing, it is that of the Earth; the width leaves room for a tilted or moving set-up.",
     ),

@@ -15,7 +15,7 @@ kind = "sample"
 def parameters(campaign):
     stated = campaign.sample.depth
     largest = max(radius for radius, _, _ in list_thrown(campaign))
-    felt = min(0.8 * deepest_expected(campaign) + 0.5 * largest, 0.8 * stated)
+    felt = min(0.9 * deepest_expected(campaign) + 0.5 * largest, 0.8 * stated)
     low = min(largest, 0.5 * felt)
     return (
         Parameter(
