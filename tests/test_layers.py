@@ -69,3 +69,22 @@ def test_heavy_libraries_stay_at_home() -> None:
             if home is not None and home != room_of(path):
                 wrong.append(f"{path.relative_to(ROOT)} imports {name}, which belongs to {home}")
     assert not wrong
+
+
+def test_gravity_stands_in_one_place() -> None:
+    """records.py; the text that ``labsim new`` writes for people to edit shows it too."""
+    found = []
+    for path in [*ROOT.rglob("*.py"), *(ROOT.parent / "docs").glob("*.md")]:
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".md":  # of its recipes, which people copy
+            blocks = text.split("```python\n")[1:]
+            text = "\n".join(block.partition("```")[0] for block in blocks)
+            numbers = ["9.81"] if "9.81" in text else []
+        else:
+            numbers = [
+                node.value
+                for node in ast.walk(ast.parse(text))
+                if isinstance(node, ast.Constant) and node.value == 9.81
+            ]
+        found += [path.name for _ in numbers]
+    assert found == ["records.py"]

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..campaign import describe_campaign, read_campaign
+from ..effects.loading import list_own_files
 from . import options
 
 
@@ -33,6 +34,11 @@ def check(
     head, verdict = summary["text"].rsplit("\n", 1)
     lines = [head, "there:"]
     lines += [f"  {found.name:{wide}}  {found.line}" for found in (*drops, *scans)]
+    code = [f"effects/{file.name}" for file in list_own_files(read.folder).values()]
+    lines += [
+        f"  {name}  code of this campaign: calibrate, diagnose and effects run it, check does not"
+        for name in code
+    ]
     if missing:
         lines += ["missing:", *(f"  {line}" for line in missing)]
     if odd:
@@ -43,6 +49,7 @@ def check(
         "text": "\n".join(lines),
         "measured": {found.name: found.numbers for found in (*drops, *scans)},
         "missing": missing,
+        "code": code,
         "warnings": odd,
     }
     options.finish(summary, summary["text"], as_json=as_json, quiet=quiet)

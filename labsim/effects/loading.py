@@ -1,12 +1,13 @@
 """Effects are found by listing a folder and checked when loaded; whatever breaks the contract is named with its file.
 
 The catalogue is ``labsim/effects/catalogue``; a campaign's own effects lie in ``CAMPAIGN/effects`` and follow the same
-contract. Their code is run as it is: take campaigns only from people you trust.
+contract. Their code is run as it is, and each file is named before it is: take campaigns only from people you trust.
 """
 
 from __future__ import annotations
 
 import inspect
+import logging
 import math
 import types
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from typing import Any
 
 from ..errors import EffectError
 from ..records import (
+    STANDARD_GRAVITY,
     Camera,
     Campaign,
     Drop,
@@ -29,6 +31,7 @@ from ..records import (
 from .contract import KINDS, OBSERVABLES, Effect, Parameter
 from .priors import HalfNormal, LogNormal, Normal, Uniform
 
+log = logging.getLogger(__name__)
 CATALOGUE = Path(__file__).parent / "catalogue"
 _loaded: dict[tuple[Path, int], Effect] = {}
 
@@ -42,7 +45,7 @@ def list_effects(campaign: Campaign | Path | str | None = None) -> dict[str, Eff
     files = _list_files(CATALOGUE)
     folder = campaign.folder if isinstance(campaign, Campaign) else Path(campaign) if campaign else None
     if folder is not None:
-        for name, file in _list_files(folder / "effects").items():
+        for name, file in list_own_files(folder).items():
             if name in files:
                 raise EffectError(
                     file, "", f"{name} is the name of an effect of the catalogue; rename the file"
@@ -52,6 +55,11 @@ def list_effects(campaign: Campaign | Path | str | None = None) -> dict[str, Eff
     if isinstance(campaign, Campaign):
         return {name: effect.for_campaign(campaign) for name, effect in effects.items()}
     return effects
+
+
+def list_own_files(folder: Path | str) -> dict[str, Path]:
+    """The effects that a campaign brings along, by name; none of them is run. Raises EffectError for a name that cannot be."""
+    return _list_files(Path(folder) / "effects")
 
 
 def load_effect(name: str, campaign: Campaign | Path | str | None = None) -> Effect:
@@ -71,6 +79,10 @@ def load_file(file: Path) -> Effect:
         raise EffectError(file, "", f"cannot be read ({trouble}); save it as UTF-8 text") from None
     key = (file, hash(source))
     if key not in _loaded:
+        if (
+            file.parent != CATALOGUE.resolve()
+        ):  # somebody else's code: said before it runs, also where little else is
+            log.warning("runs %s/%s of this campaign (%s)", file.parent.name, file.name, file.parent.parent)
         _loaded[key] = _check(file, _run(file, source))
     return _loaded[key]
 
@@ -97,7 +109,7 @@ def reference_campaign() -> Campaign:
         sample=sample,
         material=Material(),
         p_m_range=(300.0, 6000.0),
-        gravity=9.81,
+        gravity=STANDARD_GRAVITY,
         geometry="axisymmetric",
         drops=tuple(drops),
         scans=(scan,),

@@ -17,13 +17,18 @@ from labsim.effects import (
     LogNormal,
     Normal,
     Uniform,
+    deepest_dust,
     list_effects,
     list_places,
+    list_thrown,
     load_effect,
     load_file,
+    loading,
     reference_campaign,
 )
+from labsim.effects.loading import list_own_files
 from labsim.errors import EffectError
+from labsim.inference.grid import set_nominal_drop
 from labsim.sph import DropSetting
 
 DATA = Path(__file__).parents[2] / "data" / "guettler2009"
@@ -229,3 +234,46 @@ def test_priors_agree_with_themselves(prior: Normal | HalfNormal | LogNormal | U
     draws = [prior.sample(rng) for _ in range(4000)]
     assert stats.kstest(draws, twin.cdf).pvalue > 1e-3
     assert prior.describe()
+
+
+def test_the_deepest_dust_is_that_of_the_softest_run() -> None:
+    """No drop or scan of the campaign, at any p_m of its range, holds more dust than gradients are limited for."""
+    campaign = reference_campaign()
+    lowest, highest = campaign.p_m_range
+    thrown = [*campaign.drops, *campaign.scans]
+    depths = [
+        set_nominal_drop(campaign, each.projectile, speed, p_m, 5.0).extent[1]
+        for each, (_, _, speed) in zip(thrown, list_thrown(campaign), strict=True)
+        for p_m in np.geomspace(lowest, highest, 7)
+    ]
+    spacing = 1.5e-3 / 5.0  # of the largest tip: depths are whole numbers of it
+    assert deepest_dust(campaign) == pytest.approx(max(depths), abs=spacing)
+    shallow = dataclasses.replace(campaign, p_m_range=(1300.0, highest))
+    assert deepest_dust(shallow) < 0.9 * deepest_dust(campaign)
+    steepest = load_effect("density_gradient", campaign).parameters[0].limits[1]
+    assert campaign.sample.filling_factor + steepest * max(depths) < campaign.material.phi_2
+
+
+def test_code_of_a_campaign_is_announced_before_it_runs(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "effects").mkdir()
+    file = tmp_path / "effects" / "evil.py"
+    file.write_text(
+        "import logging\nlogging.getLogger('evil').warning('it runs')\n" + GOOD.split('"""', 2)[2],
+        encoding="utf-8",
+    )
+    assert list_own_files(tmp_path) == {"evil": file} and not caplog.records  # listed, not run
+    list_effects(tmp_path)
+    assert [record.getMessage() for record in caplog.records] == [
+        f"runs effects/evil.py of this campaign ({tmp_path.resolve()})",
+        "it runs",
+    ]
+    list_effects(tmp_path)  # kept: not run again
+    assert len(caplog.records) == 2
+
+
+def test_effects_of_the_catalogue_are_not_announced(caplog: pytest.LogCaptureFixture) -> None:
+    loading._loaded.clear()
+    list_effects()
+    assert not caplog.records
