@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from .errors import CampaignError
 from .records import Measured
+from .text_files import load_toml
 
 _REQUIRED: Any = object()
 EXPLAINED = "labsim new DIR writes a campaign with every table and key explained"
@@ -160,17 +160,7 @@ class Document:
 
     def __init__(self, file: Path) -> None:
         self.file = file
-        try:
-            with file.open("rb") as stream:
-                self.values = tomllib.load(stream)
-        except FileNotFoundError:
-            raise CampaignError(file, "", f"no such file; write it ({EXPLAINED})") from None
-        except tomllib.TOMLDecodeError as trouble:
-            raise CampaignError(file, "", f"is not TOML: {trouble}; correct that line") from None
-        except UnicodeDecodeError:
-            raise CampaignError(file, "", "is not UTF-8 text; save it as UTF-8") from None
-        except OSError as trouble:
-            raise CampaignError(file, "", f"cannot be read ({trouble.strerror}); make it readable") from None
+        self.values = load_toml(file, CampaignError, f"write it ({EXPLAINED})")
         self.asked: set[str] = set()
         self.tables: list[Table] = []
 

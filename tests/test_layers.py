@@ -10,6 +10,7 @@ import labsim
 ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
+    {"text_files"},
     {"tables", "tracks"},
     {"campaign_tables"},
     {"campaign", "video", "ct", "sph"},  # siblings that never import each other

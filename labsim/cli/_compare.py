@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +12,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..errors import LabsimError
+from ..text_files import load_json, load_toml
 from ._provenance import KEY
 
 # how long it took, where it lies, what was in the store: not results
@@ -82,14 +82,14 @@ def _read(path: Path) -> dict[str, Any]:
     """key -> number, text or array. Raises nothing: what cannot be read is its bytes."""
     try:
         if path.suffix == ".json":
-            return dict(_flatten(json.loads(path.read_text(encoding="utf-8"))))
+            return dict(_flatten(load_json(path, LabsimError, "")))
         if path.suffix == ".toml":
-            return dict(_flatten(tomllib.loads(path.read_text(encoding="utf-8"))))
+            return dict(_flatten(load_toml(path, LabsimError, "")))
         if path.suffix == ".csv":
             return _read_table(path)
         if path.suffix in {".h5", ".nc"}:
             return _read_arrays(path)
-    except (OSError, ValueError, KeyError, RuntimeError):
+    except (LabsimError, OSError, ValueError, KeyError, RuntimeError, RecursionError):
         pass
     return {"content": path.read_bytes()}
 

@@ -19,6 +19,7 @@ from typing import Any
 
 from ..errors import LabsimError
 from ..inference.workers import explain_loss, open_executor, wait_for_any
+from ..text_files import load_json
 from . import _provenance, options
 
 Measure = Callable[
@@ -178,9 +179,9 @@ def _hash_code() -> str:
 
 def _find(file: Path, mark: str) -> dict[str, Any] | None:
     try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
+        summary = load_json(file, LabsimError, "it is made again")
         return summary if summary[_provenance.KEY]["item"] == mark else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (LabsimError, KeyError, TypeError):
         return None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import LabsimError
+from ..text_files import load_json
 from . import _provenance, options
 from ._compare import Comparison, compare_folders
 
@@ -78,12 +78,8 @@ def read_made_by(folder: Path) -> dict[str, Any]:
         file = folder / name
         if not file.is_file():
             continue
-        try:
-            made_by = json.loads(file.read_text(encoding="utf-8")).get(_provenance.KEY)
-        except (OSError, ValueError, AttributeError, RecursionError) as trouble:
-            raise LabsimError(
-                file, "", f"cannot be read ({trouble}); it is not a summary of labsim"
-            ) from None
+        summary = load_json(file, LabsimError, "name the output folder of an earlier command")
+        made_by = summary.get(_provenance.KEY) if isinstance(summary, dict) else None
         shape = {"command": list, "folder": str, "versions": dict, "solver": str, "inputs": dict}
         if not isinstance(made_by, dict) or any(
             not isinstance(made_by.get(key), kind) for key, kind in shape.items()

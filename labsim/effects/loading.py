@@ -121,6 +121,8 @@ def _list_files(folder: Path) -> dict[str, Path]:
         return {}
     files = sorted(file for file in folder.glob("*.py") if not file.name.startswith("_"))
     for file in files:
+        if not file.is_file():
+            raise EffectError(file, "", "is a folder or a device, not a file; remove it or rename it")
         if not file.stem.isidentifier() or file.stem != file.stem.lower():
             raise EffectError(
                 file, "", f"{file.stem!r} cannot be an effect's name; use lower case, digits and _"

@@ -17,7 +17,6 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +26,7 @@ from ..campaign_tables import MATERIAL_KEYS
 from ..errors import EffectError
 from ..records import Campaign
 from ..sph import DropSetting
+from ..text_files import load_toml
 from .contract import Effect, Instrument, Place, Values
 from .loading import list_effects
 
@@ -47,7 +47,7 @@ def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) ->
     """Read a model.toml. effects: what list_effects gives for the campaign; the catalogue if None. Raises EffectError."""
     path = Path(path)
     known = effects if effects is not None else list_effects()
-    document = _load(path)
+    document = load_toml(path, EffectError, "name a model.toml as labsim diagnose writes it")
     _refuse_others(path, "", document, ("format", "material", "effects"))
     if document.get("format", FORMAT) != FORMAT:
         raise EffectError(
@@ -156,18 +156,6 @@ def make_instrument(model: Model, place: Place, effects: Mapping[str, Effect] | 
     for name, values in model.effects:
         instrument = known[name].apply_to_instrument(instrument, values, place)
     return instrument
-
-
-def _load(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as stream:
-            return tomllib.load(stream)
-    except FileNotFoundError:
-        raise EffectError(path, "", "no such file; name a model.toml as labsim diagnose writes it") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as trouble:
-        raise EffectError(path, "", f"is not TOML: {trouble}; correct that line") from None
-    except OSError as trouble:
-        raise EffectError(path, "", f"cannot be read ({trouble.strerror}); name a model.toml") from None
 
 
 def _table(path: Path, key: str, values: Any) -> dict[str, Any]:

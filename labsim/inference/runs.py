@@ -21,8 +21,9 @@ from typing import Any, cast
 import filelock
 import platformdirs
 
-from ..errors import InferenceError, SimulationError
+from ..errors import InferenceError, LabsimError, SimulationError
 from ..sph import DropRun, DropSetting, simulate, solver_hash
+from ..text_files import load_json
 from .run_file import (
     DAMAGE,
     FailedRun,
@@ -205,8 +206,8 @@ class RunStore:
         """All runs, newest first. ``index.json`` only saves reading every file and is made again whenever it is wrong."""
         cache: dict[str, dict] = {}
         path = self.folder / "index.json"
-        with contextlib.suppress(OSError, ValueError):
-            kept = json.loads(path.read_text())
+        with contextlib.suppress(LabsimError):
+            kept = load_json(path, InferenceError, "it is made again")
             cache = {k: v for k, v in kept.items() if isinstance(v, dict)} if isinstance(kept, dict) else {}
         entries: dict[str, Stored] = {}
         for file in self.folder.glob("??/*.h5"):

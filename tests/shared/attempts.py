@@ -43,7 +43,14 @@ class Attempt:
         return ""
 
 
-def attempt(arguments: list[object], root: Path, out: str = "out") -> Attempt:
+def attempt(
+    arguments: list[object],
+    root: Path,
+    out: str = "out",
+    *,
+    cpu_seconds: int = CPU_SECONDS,
+    wall_seconds: float = WALL_SECONDS,
+) -> Attempt:
     """``labsim ARGUMENTS`` in ``root``; whatever it writes must lie in ``root/out``."""
     before = _survey(root, out)
     said, printed = root.with_name(root.name + ".err"), root.with_name(root.name + ".out")
@@ -52,7 +59,7 @@ def attempt(arguments: list[object], root: Path, out: str = "out") -> Attempt:
         status = 70
         try:
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-            resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 5))
+            resource.setrlimit(resource.RLIMIT_CPU, (cpu_seconds, cpu_seconds + 5))
             for descriptor, file in ((1, printed), (2, said)):
                 opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
                 os.dup2(opened, descriptor)
@@ -70,7 +77,7 @@ def attempt(arguments: list[object], root: Path, out: str = "out") -> Attempt:
             for stream in (sys.stdout, sys.stderr):
                 stream.flush()
             os._exit(status)
-    deadline = time.monotonic() + WALL_SECONDS
+    deadline = time.monotonic() + wall_seconds
     while True:
         done, result, usage = os.wait4(child, os.WNOHANG)
         if done:
