@@ -121,9 +121,10 @@ def try_command(kind: str, chance: random.Random, folder: Path) -> tuple[str, fl
     store = folder / "store"
     arguments = ["-m", "labsim", *COMMAND, "-o", str(folder / "out"), "--store", str(store)]
     process = start(arguments, preexec_fn=prepare)
-    if kind == "full":
-        while process.poll() is None and not list(store.glob("??/*.h5")):
-            time.sleep(0.01)
+    first = ""
+    if kind == "full":  # the seconds are those from its line to its end
+        assert process.stderr is not None
+        first = process.stderr.readline()
     else:
         while process.poll() is None and not list_workers(process.pid):
             time.sleep(0.01)
@@ -136,7 +137,7 @@ def try_command(kind: str, chance: random.Random, folder: Path) -> tuple[str, fl
     found = end(process)
     if found is None:
         return "hang", LIMIT
-    said, seconds = found
+    said, seconds = first + found[0], found[1]
     lines = [line for line in said.splitlines() if line.strip()]
     good = process.returncode in EXPECTED[kind]
     good &= (not lines) if process.returncode == 0 else len(lines) == 1 and lines[0].startswith("error: ")
