@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from mesh import Dust, Numerics, Result, run_drop
-from tip import measure_tip, print_table
+from tip import THRESHOLDS, measure_tip, print_table
 
 STOPS = Path(__file__).parents[2] / "data" / "reference" / "independent_stops.csv"
 
@@ -57,6 +57,26 @@ def describe(
     }
 
 
+def append_row(path: Path, found: Result, tip_mm: float, speed: float, dust: Dust, cells: float) -> None:
+    """One drop's figures as a line of a CSV, with a header where there is none."""
+    places = (x.ravel() for x in (found.r, found.z, found.volume, found.phi))
+    tip = tip_mm * 1e-3
+    figures = measure_tip(*places, found.stopping_depth, tip, tip / cells)
+    row = {
+        "tip_radius_mm": f"{tip_mm:g}", "speed_m_s": f"{speed:.2f}", "p_m_pa": f"{dust.p_m:g}",
+        "bulk_modulus_kpa": f"{dust.bulk_modulus * 1e-3:g}", "cells": f"{cells:g}",
+        "depth_mm": f"{found.stopping_depth * 1e3:.4f}", "stopping_time_ms": f"{found.stopping_time * 1e3:.3f}",
+        **{f"volume{100 * level:.0f}": f"{figures[f'V(>{level:.2f})']:.3f}" for level in THRESHOLDS},
+        "largest_phi": f"{figures['max']:.3f}", "phi_999": f"{figures['99.9']:.3f}",
+    }  # fmt: skip
+    begins = not path.exists()
+    with path.open("a", newline="") as lines:
+        writer = csv.DictWriter(lines, list(row), lineterminator="\n")
+        if begins:
+            writer.writeheader()
+        writer.writerow(row)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -75,6 +95,7 @@ def main() -> None:
     parser.add_argument("--gas-kpa", type=float, default=0.0, help="trapped in the pores")
     for choice in ("growth", "even", "width", "depth", "courant", "linear", "quadratic", "hourglass"):
         parser.add_argument(f"--{choice}", type=float, default=getattr(Numerics, choice))
+    parser.add_argument("-o", "--output", type=Path, help="append the figures to this CSV as well")
     given = parser.parse_args()
     dust = Dust(p_m=given.p_m, bulk_modulus=given.bulk_modulus_kpa * 1e3, gas_pressure=given.gas_kpa * 1e3)
     tip = given.tip_radius_mm * 1e-3
@@ -97,6 +118,8 @@ def main() -> None:
             limits = find_limits(given.tip_radius_mm, speed) if nominal else None
             seconds = time.process_time() - began
             columns[f"{speed:g} m/s, a/dx {cells:g}"] = describe(found, seconds, tip, cells, limits)
+            if given.output:
+                append_row(given.output, found, given.tip_radius_mm, speed, dust, cells)
     print(
         f"tip radius {given.tip_radius_mm:g} mm, p_m {dust.p_m:g} Pa, K0 {dust.bulk_modulus * 1e-3:g} kPa; ",
         end="",
