@@ -12,14 +12,17 @@ from typing import Any
 
 import numpy as np
 
+from .campaign_scans import read_scan
 from .campaign_tables import (
-    read_bead,
+    find_toml,
+    list_parts,
     read_camera,
     read_material,
     read_planar,
     read_projectile,
     read_published,
     read_sample,
+    read_source,
 )
 from .errors import CampaignError, MeasurementError
 from .records import (
@@ -27,15 +30,12 @@ from .records import (
     Camera,
     Campaign,
     Drop,
-    GreyCalibration,
     PublishedScan,
     Record,
     Scan,
 )
 from .tables import Document, Table
 from .tracks import read_rows
-
-SLICE_SUFFIXES = {".tif", ".tiff", ".png", ".bmp"}
 
 
 def read_campaign(folder: Path | str) -> Campaign:
@@ -58,13 +58,13 @@ def read_campaign(folder: Path | str) -> Campaign:
     gravity = model.number("gravity_m_s2", 0.0, 30.0, default=STANDARD_GRAVITY)
     geometry = model.choice("geometry", ("axisymmetric", "planar"), "axisymmetric")
     planar = read_planar(document.table("planar", required=False))
-    source = _read_source(document)
+    source = read_source(document)
     document.close()
 
-    drops = tuple(read_drop(path) for path in _list_parts(folder / "drops", "drop.toml"))
+    drops = tuple(read_drop(path) for path in list_parts(folder / "drops", "drop.toml"))
     if not drops:
         raise CampaignError(folder / "drops", "", "holds no drop; add drops/D01/drop.toml")
-    read_scans = [read_scan(path) for path in _list_parts(folder / "ct", "scan.toml")]
+    read_scans = [read_scan(path) for path in list_parts(folder / "ct", "scan.toml")]
     _check_sequence(folder, drops)
     for wanted in planar.calibration_drops:
         if wanted not in {drop.name for drop in drops}:
@@ -92,7 +92,7 @@ def read_campaign(folder: Path | str) -> Campaign:
 
 def read_drop(path: Path | str) -> Drop:
     """Read one drop: its folder or its drop.toml. Raises CampaignError."""
-    file = _toml_of(Path(path), "drop.toml")
+    file = find_toml(Path(path), "drop.toml")
     document = Document(file)
     document.top()
     record_table = document.table("record")
@@ -123,7 +123,7 @@ def read_drop(path: Path | str) -> Drop:
             path=data,
             row_sigma=record_table.number("row_sigma_px", 1e-6, 50.0, default=None),
         )
-    source = _read_source(document)
+    source = read_source(document)
     document.close()
     if kind == "track":
         _check_track(record.path, camera)  # type: ignore[arg-type]
@@ -137,48 +137,6 @@ def read_drop(path: Path | str) -> Drop:
         published=published,
         source=source,
     )
-
-
-def read_scan(path: Path | str) -> Scan | PublishedScan:
-    """Read one CT scan: its folder or its scan.toml. Published figures instead of slices give a PublishedScan."""
-    file = _toml_of(Path(path), "scan.toml")
-    document = Document(file)
-    document.top()
-    projectile = read_bead(document.table("projectile"))
-    speed = document.table("drop").measured("speed_m_s", 1e-3, 100.0)
-    assert speed is not None
-    source = _read_source(document)
-    if document.has("published"):
-        table = document.table("published")
-        low = table.number("filling_factor_low", 0.01, 0.74)
-        high = table.number("filling_factor_high", 0.01, 1.0)
-        if high <= low:
-            raise table.wrong(
-                "filling_factor_high", f"{high:g} is not above filling_factor_low = {low:g}; raise it"
-            )
-        volume = table.measured("compacted_volume_sphere_volumes", 0.0, 100.0)
-        assert volume is not None
-        document.close()
-        return PublishedScan(file.parent.name, projectile, speed, low, high, volume, source)
-    table = document.table("scan")
-    slices = file.parent / table.text("slices")
-    voxel = table.number("voxel_um", 0.1, 1000.0, unit=1e-6)
-    first = table.choice("first_slice", ("top", "bottom"))
-    bits = table.number("bits", 8, 16, whole=True)
-    if bits not in (8, 16):
-        raise table.wrong("bits", f"{bits} is not 8 or 16; write the depth of the slice images")
-    grey = document.table("calibration")
-    calibration = GreyCalibration(
-        grey_air=grey.number("grey_air", -70000.0, 70000.0),
-        grey_per_density=grey.number("grey_per_density", 1e-6, 1e3),
-        density_solid=grey.number("density_solid_kg_m3", 100.0, 23000.0),
-    )
-    document.close()
-    if not slices.is_dir():
-        raise table.wrong("slices", f"{slices} is not a folder; name the folder of the slice images")
-    if not any(p.suffix.lower() in SLICE_SUFFIXES for p in slices.iterdir()):
-        raise table.wrong("slices", f"{slices} holds no TIFF, PNG or BMP image; put the slices there")
-    return Scan(file.parent.name, projectile, speed, slices, voxel, first, bits, calibration)  # type: ignore[arg-type]
 
 
 def describe_campaign(campaign: Campaign) -> dict[str, Any]:
@@ -222,12 +180,6 @@ def _count(things: Sequence[object], noun: str) -> str:
     return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
 
 
-def _read_source(document: Document) -> dict[str, Any]:
-    """[source]: free text, one key a figure, kept as written."""
-    table = document.table("source", required=False)
-    return {key: table.text(key) for key in table.values}
-
-
 def _existing(table: Table, folder: Path, *, folder_allowed: bool) -> Path:
     path = folder / table.text("file")
     if not (path.is_file() or (folder_allowed and path.is_dir())):
@@ -252,23 +204,6 @@ def _check_track(path: Path, camera: Camera) -> None:
             f"the track never reaches the surface (largest row {deepest:g}, surface_row_px {camera.surface_row:g}); "
             "rows grow downwards: check surface_row_px",
         )
-
-
-def _toml_of(path: Path, name: str) -> Path:
-    if not path.exists():
-        raise CampaignError(path, "", f"no such file or folder; give a folder that holds {name}")
-    return path / name if path.is_dir() else path
-
-
-def _list_parts(folder: Path, name: str) -> list[Path]:
-    """Sub-folders in the order of their names; each must hold the TOML file."""
-    if not folder.is_dir():
-        return []
-    parts = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith((".", "__")))
-    for part in parts:
-        if not (part / name).is_file():
-            raise CampaignError(part, name, "is missing in this folder; add it or remove the folder")
-    return parts
 
 
 def _check_sequence(folder: Path, drops: tuple[Drop, ...]) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Any
 
 from .errors import CampaignError
 from .records import Camera, Material, Planar, Projectile, Published, Sample
-from .tables import Table
+from .tables import Document, Table
 
 # densities between which a projectile is believed, kg/m^3: a hollow tube up to osmium
 LIGHTEST, HEAVIEST = 20.0, 23000.0
@@ -155,3 +157,26 @@ def read_published(table: Table, height_known: bool) -> Published:
             "penetration_depth_mm", "and stopping_time_ms are both missing; give at least one of them"
         )
     return published
+
+
+def read_source(document: Document) -> dict[str, Any]:
+    """[source]: free text, one key a figure, kept as written."""
+    table = document.table("source", required=False)
+    return {key: table.text(key) for key in table.values}
+
+
+def find_toml(path: Path, name: str) -> Path:
+    if not path.exists():
+        raise CampaignError(path, "", f"no such file or folder; give a folder that holds {name}")
+    return path / name if path.is_dir() else path
+
+
+def list_parts(folder: Path, name: str) -> list[Path]:
+    """Sub-folders in the order of their names; each must hold the TOML file."""
+    if not folder.is_dir():
+        return []
+    parts = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith((".", "__")))
+    for part in parts:
+        if not (part / name).is_file():
+            raise CampaignError(part, name, "is missing in this folder; add it or remove the folder")
+    return parts

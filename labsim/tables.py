@@ -164,6 +164,13 @@ class Document:
         self.asked: set[str] = set()
         self.tables: list[Table] = []
 
+    @classmethod
+    def of(cls, where: Path, values: dict[str, Any]) -> Document:
+        """The same of tables that no file holds; ``where`` stands in the messages in place of the file."""
+        document = cls.__new__(cls)
+        document.file, document.values, document.asked, document.tables = where, values, set(), []
+        return document
+
     def top(self) -> Table:
         """The keys that stand above the first table."""
         table = Table(self.file, "", {k: v for k, v in self.values.items() if not isinstance(v, dict)})

@@ -136,7 +136,7 @@ MISTAKES = {
     "published with track": (lambda f: (f / D).write_text(DROP + "[published]\n"), [D, "[published]", "summary"]),
     "summary with camera": (_replace(D, '"track"', '"summary"'), [D, "[camera]", "remove"]),
     "summary without sigma": (lambda f: (f / D).write_text(SUMMARY), [D, "penetration_depth_sigma_mm", "missing"]),
-    "no slices": (_remove("ct/C01/slices"), [S, "scan.slices", "not a folder"]),
+    "no slices": (_remove("ct/C01/slices"), [S, "scan.slices", "not there"]),
     "empty slices": (_remove("ct/C01/slices/slice_0000.tif"), [S, "scan.slices", "no TIFF"]),
     "12 bits": (_replace(S, "bits = 8", "bits = 12"), [S, "scan.bits", "12", "8 or 16"]),
     "first slice": (_replace(S, '"top"', '"left"'), [S, "scan.first_slice", "left", "bottom"]),

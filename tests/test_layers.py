@@ -11,8 +11,9 @@ ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
     {"text_files"},
-    {"tables", "tracks"},
+    {"tables", "tiff_pages", "tracks"},
     {"campaign_tables"},
+    {"campaign_scans"},
     {"campaign", "video", "ct", "sph"},  # siblings that never import each other
     {"effects", "tracking"},
     {"inference"},

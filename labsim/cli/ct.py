@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import CampaignError
-from ..records import Campaign, Scan
+from ..errors import CampaignError, LabsimError
+from ..records import Scan
 from . import options
 from ._many import Item, finish_many, measure_many
 from .options import AsJson, Out, Quiet, finish, make_output_folder, show_progress, write_json
@@ -17,9 +17,34 @@ from .options import AsJson, Out, Quiet, finish, make_output_folder, show_progre
 
 def ct(
     scan: Annotated[
-        Path, typer.Argument(help="Folder of one scan, with its scan.toml, or a whole campaign.")
+        Path,
+        typer.Argument(
+            help="Folder of one scan, with its scan.toml; a whole campaign; or slices: a folder of images, a TIFF, an HDF5 file."
+        ),
     ],
     out: Out = None,
+    voxel_um: Annotated[float | None, typer.Option("--voxel-um", help="Edge of a voxel.")] = None,
+    first_slice: Annotated[
+        str | None, typer.Option("--first-slice", help='Where the first slice lies: "top" or "bottom".')
+    ] = None,
+    bits: Annotated[
+        int | None, typer.Option("--bits", help="Depth of the slices, 8 or 16. Default: the file's.")
+    ] = None,
+    grey_air: Annotated[float | None, typer.Option("--grey-air", help="Grey level of air.")] = None,
+    grey_per_density: Annotated[
+        float | None, typer.Option("--grey-per-density", help="Grey levels per kg/m³.")
+    ] = None,
+    density_solid: Annotated[
+        float | None, typer.Option("--density-solid", help="Density of the grains' own material, kg/m³.")
+    ] = None,
+    bead_radius_mm: Annotated[
+        float | None, typer.Option("--bead-radius-mm", help="Radius of the bead.")
+    ] = None,
+    bead_mass_mg: Annotated[float | None, typer.Option("--bead-mass-mg", help="Mass of the bead.")] = None,
+    sample_filling_factor: Annotated[
+        float | None,
+        typer.Option("--filling-factor", help="Of the sample as prepared; a check of the calibration only."),
+    ] = None,
     cell: Annotated[int, typer.Option("--cell", min=1, max=20, help="Voxels along an edge of a cell.")] = 2,
     guard: Annotated[
         float, typer.Option("--guard", min=0, help="Voxels about the bead that are left out.")
@@ -29,13 +54,31 @@ def ct(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Reduce a CT scan: slices to an axisymmetric map of the filling factor and its compacted volume."""
-    from ..campaign import read_campaign, read_scan
+    """Reduce a CT scan: slices to an axisymmetric map of the filling factor and its compacted volume.
 
+    What scan.toml would say can be given as options: all of it for slices without one, or single values that stand over it.
+    """
+    from ..campaign_scans import read_sample_alone, read_scan, read_scans
+
+    tables = {
+        "projectile": {"radius_mm": bead_radius_mm, "mass_mg": bead_mass_mg},
+        "scan": {"voxel_um": voxel_um, "first_slice": first_slice, "bits": bits},
+        "calibration": {
+            "grey_air": grey_air, "grey_per_density": grey_per_density, "density_solid_kg_m3": density_solid,
+        },
+    }  # fmt: skip
+    stated = {
+        name: {key: value for key, value in values.items() if value is not None}
+        for name, values in tables.items()
+    }
     if (scan / "campaign.toml").is_file():
-        read = read_campaign(scan)
-        given = {"cell": cell, "guard": guard, "sample": read.sample.filling_factor}
-        items = [Item(each.name, scan / "ct" / each.name, given) for each in _list_scans(read)]
+        if any(stated.values()):
+            raise LabsimError("command line", "--voxel-um …", "belong to one scan; name its folder")
+        sample, scans = read_scans(scan)
+        if not scans:
+            raise CampaignError(scan / "ct", "", "holds no scan with slices; there is nothing to reduce")
+        given = {"cell": cell, "guard": guard, "sample": sample_filling_factor or sample.filling_factor}
+        items = [Item(each.name, scan / "ct" / each.name, given) for each in scans]
         target = make_output_folder(out, scan, "ct")
         with show_progress(quiet) as progress:
             found = measure_many(
@@ -49,31 +92,68 @@ def ct(
             )
         finish_many(found, target / "scans.json", _describe_shortly, as_json=as_json, quiet=quiet)
         return
-    record = read_scan(scan)
+    record = read_scan(scan, given=_complete(scan, stated), speed_required=False)
     if not isinstance(record, Scan):
         raise CampaignError(
             scan, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
         )
     folder = scan.resolve() if scan.is_dir() else scan.resolve().parent
     campaign = folder.parent.parent
-    sample = read_campaign(campaign).sample.filling_factor if (campaign / "campaign.toml").is_file() else None
+    if sample_filling_factor is None and (campaign / "campaign.toml").is_file():
+        sample_filling_factor = read_sample_alone(campaign).filling_factor
     target = make_output_folder(out, scan, "ct")
+    given = {"cell": cell, "guard": guard, "sample": sample_filling_factor}
     with show_progress(quiet) as progress:
-        summary, lines = reduce_one(scan, target, {"cell": cell, "guard": guard, "sample": sample}, progress)
+        summary, lines = reduce_record(record, target, given, progress)
     finish({**summary, "out": str(target)}, f"{lines}\nwritten to {target}", as_json=as_json, quiet=quiet)
+
+
+def _complete(scan: Path, stated: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """The options of slices without scan.toml, with what the files themselves say; all that is missing is named at once."""
+    from ..campaign_scans import is_stack
+
+    if not is_stack(scan):
+        return stated
+    needed = {
+        "--voxel-um": ("scan", "voxel_um"),
+        "--grey-air": ("calibration", "grey_air"),
+        "--grey-per-density": ("calibration", "grey_per_density"),
+        "--density-solid": ("calibration", "density_solid_kg_m3"),
+        "--bead-radius-mm": ("projectile", "radius_mm"),
+        "--bead-mass-mg": ("projectile", "mass_mg"),
+    }
+    missing = [option for option, (table, key) in needed.items() if key not in stated[table]]
+    if missing:
+        raise CampaignError(
+            scan, "scan.toml", f"is missing; write it beside the slices, or give {', '.join(missing)}"
+        )
+    from ..ct import open_stack
+
+    depth = 8 * open_stack(scan).dtype.itemsize
+    stated["scan"] = {"first_slice": "top", "bits": depth if depth in (8, 16) else 16, **stated["scan"]}
+    stated["projectile"]["shape"] = "sphere"
+    return stated
 
 
 def reduce_one(
     source: Path, target: Path, given: dict[str, Any], progress: options.Progress | None = None
 ) -> tuple[dict[str, Any], str]:
+    """Files of one scan of a campaign; its summary and the lines for people."""
+    from ..campaign_scans import read_scan
+
+    record = read_scan(source, speed_required=False)
+    assert isinstance(record, Scan)
+    return reduce_record(record, target, given, progress)
+
+
+def reduce_record(
+    record: Scan, target: Path, given: dict[str, Any], progress: options.Progress | None = None
+) -> tuple[dict[str, Any], str]:
     """Files of one scan; its summary and the lines for people."""
-    from ..campaign import read_scan
     from ..ct import compress, reduce_scan, summarise_scan, write_compressed, write_map
     from ..report.map_figures import draw_compressed, draw_map
 
     began = time.perf_counter()
-    record = read_scan(source)
-    assert isinstance(record, Scan)
     reduced = reduce_scan(
         record,
         cell=given["cell"],
@@ -90,14 +170,6 @@ def reduce_one(
     draw_compressed(curve, target / "compressed_volume.png", record.name)
     write_json(target / "scan.json", summary)
     return summary, describe(summary)
-
-
-def _list_scans(campaign: Campaign) -> tuple[Scan, ...]:
-    if not campaign.scans:
-        raise CampaignError(
-            campaign.folder / "ct", "", "holds no scan with slices; there is nothing to reduce"
-        )
-    return campaign.scans
 
 
 def _describe_shortly(name: str, summary: dict) -> str:

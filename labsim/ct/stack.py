@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import MeasurementError
+from ..errors import LabsimError, MeasurementError
+from ..tiff_pages import check_size
 
 KEPT_IN_MEMORY = 256 * 2**20  # bytes; larger stacks are read again for every pass over them
+MOST_PACKED = 100.0  # slices with noise in them shrink two to ten times; what shrinks more is no scan
 
 
 @dataclass
 class SliceStack:
     """Slices of one scan. ``read(k)`` gives slice k as stored, (ny, nx); ``slice`` and iteration keep small stacks.
 
-    voxel : m, where the files themselves state it; facts : what the files say about themselves.
+    names : of the slices as stored, for messages; packed : bytes on the disk; voxel : m, where the files themselves state
+    it; facts : what the files say about themselves.
     """
 
     source: Path
@@ -32,20 +35,41 @@ class SliceStack:
     facts: dict = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     flipped: bool = False
+    names: Sequence[str] | None = None
+    packed: int = 0
     _kept: dict[int, npt.NDArray] = field(default_factory=dict, repr=False)
 
     @property
     def bytes(self) -> int:
         return self.count * self.shape[0] * self.shape[1] * self.dtype.itemsize
 
+    def name(self, k: int) -> str:
+        """What the user calls slice k, counted from the top: its file, or its number in the file from 0."""
+        stored = self.count - 1 - k if self.flipped else k
+        return self.names[stored] if self.names is not None else f"slice {stored}"
+
     def slice(self, k: int) -> npt.NDArray:
+        """Slice k, counted from the top, (ny, nx). Raises MeasurementError that names it."""
         if k in self._kept:
             return self._kept[k]
-        image = np.asarray(self.read(self.count - 1 - k if self.flipped else k))
+        try:
+            image = np.asarray(self.read(self.count - 1 - k if self.flipped else k))
+        except LabsimError:
+            raise
+        except Exception as trouble:  # the readers raise many kinds on damaged files
+            raise MeasurementError(
+                self.source, self.name(k), f"cannot be read ({_first_line(trouble)}); export it again"
+            ) from None
+        if image.dtype.kind == "f" and not np.isfinite(image).all():
+            raise MeasurementError(
+                self.source,
+                self.name(k),
+                "holds values that are not finite (NaN or infinite); export this slice again",
+            )
         if image.shape != self.shape:
             raise MeasurementError(
                 self.source,
-                f"slice {k}",
+                self.name(k),
                 f"is {image.shape[1]} x {image.shape[0]} pixels, the first one {self.shape[1]} x {self.shape[0]}; "
                 "export all slices with one size",
             )
@@ -76,9 +100,22 @@ def open_stack(path: Path | str) -> SliceStack:
     for name in names:
         module = importlib.import_module(f"{__package__}.formats.{name}")
         if module.recognise(path):
-            return module.open_stack(path)
+            stack: SliceStack = module.open_stack(path)
+            check_size(path, "scan.slices", *stack.shape)
+            if stack.packed and stack.bytes > max(KEPT_IN_MEMORY, MOST_PACKED * stack.packed):
+                raise MeasurementError(
+                    path,
+                    "scan.slices",
+                    f"{stack.packed / 1e6:.1f} MB would unpack to {stack.bytes / 1e9:.1f} GB, more than slices with noise in "
+                    "them can; export them again",
+                )
+            return stack
     raise MeasurementError(
         path,
         "scan.slices",
         f"holds no slices in a known format ({', '.join(names)}); export 8- or 16-bit TIFF",
     )
+
+
+def _first_line(trouble: Exception) -> str:
+    return (str(trouble).splitlines() or [type(trouble).__name__])[0][:120]

@@ -163,7 +163,7 @@ def test_bad_scans_are_one_line_each(tmp_path):
     (tmp_path / "good" / "slice_0050.tif").rename(tmp_path / "away.tif")
     assert "missing or doubled between slice_0049.tif and slice_0051.tif" in complaint(scan)
     tifffile.imwrite(tmp_path / "good" / "slice_0050.tif", grey[50][:-4])
-    assert "slice 50: is 104 x 100 pixels" in complaint(scan)
+    assert "slice_0050.tif: is 104 x 100 pixels" in complaint(scan)
     (tmp_path / "good" / "slice_0050.tif").write_bytes(b"no image")
     assert "slice_0050.tif" in complaint(scan)
 

@@ -25,6 +25,8 @@ def open_stack(path: Path) -> SliceStack:
     if "exchange/data" not in file:
         raise MeasurementError(path, "exchange/data", "is missing; DXchange keeps the volume there")
     data = file["exchange/data"]
+    if not isinstance(data, h5py.Dataset) or data.dtype.kind not in "uif":
+        raise MeasurementError(path, "exchange/data", "holds no numbers; DXchange keeps the volume there")
     if "exchange/theta" in file or "exchange/data_white" in file:
         raise MeasurementError(
             path, "exchange/data", "holds projections, not slices; labsim.ct.reconstruct makes slices of them"
@@ -36,5 +38,5 @@ def open_stack(path: Path) -> SliceStack:
     voxel = data.attrs.get("voxel_m")
     return SliceStack(
         path, data.shape[0], data.shape[1:], data.dtype, lambda k: data[k],
-        None if voxel is None else float(voxel), {"format": "hdf5"},
+        None if voxel is None else float(voxel), {"format": "hdf5"}, packed=path.stat().st_size,
     )  # fmt: skip

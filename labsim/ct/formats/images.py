@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 import tifffile
 from PIL import Image
 
-from ...errors import MeasurementError
+from ...errors import LabsimError, MeasurementError
+from ...tiff_pages import check_size, count_pages
 from ..skyscan import check_log, find_log, read_log
 from ..stack import SliceStack
 
@@ -35,21 +37,32 @@ def open_stack(path: Path) -> SliceStack:
         facts["log"] = log.sections
         facts["slice_spacing"] = log.slice_spacing
     return SliceStack(
-        path, len(files), first.shape, first.dtype, lambda k: read_image(files[k]), voxel, facts, warnings
-    )
+        path, len(files), first.shape, first.dtype, lambda k: read_image(files[k]), voxel, facts, warnings,
+        names=[file.name for file in files], packed=sum(file.stat().st_size for file in files),
+    )  # fmt: skip
 
 
 def read_image(file: Path) -> np.ndarray:
     """One grey slice, (ny, nx). Raises MeasurementError for colour and for files that cannot be read."""
+    if file.stat().st_size == 0:
+        raise MeasurementError(file, "", "is empty (0 bytes); export this slice again")
     try:
         if file.suffix.lower() in (".tif", ".tiff"):
-            image = tifffile.imread(file)
+            count_pages(file)
+            with tifffile.TiffFile(file) as tiff:
+                series = tiff.series[0]
+                check_size(file, "", math.prod(series.shape[:-1]), series.shape[-1])
+                image = series.asarray()
         else:
             with Image.open(file) as picture:
+                check_size(file, "", picture.height, picture.width)
                 image = np.asarray(picture.convert("L") if picture.mode == "P" else picture)
+    except LabsimError:
+        raise
     except Exception as trouble:
+        text = (str(trouble).splitlines() or [type(trouble).__name__])[0][:120]
         raise MeasurementError(
-            file, "", f"cannot be read as an image ({trouble}); export this slice again"
+            file, "", f"cannot be read as an image ({text}); export this slice again"
         ) from None
     if image.ndim == 3 and image.shape[2] in (3, 4) and (image[..., :1] == image[..., :3]).all():
         image = image[..., 0]
@@ -90,6 +103,11 @@ def _list_slices(folder: Path) -> list[Path]:
         match = re.search(r"^(.*?)(\d+)$", item.stem)
         if match and item.suffix.lower() == suffix:  # other names are previews, such as NRecon's _spr.bmp
             numbered.setdefault(match.group(1), []).append((int(match.group(2)), item))
+    if len(images) == 1:
+        raise MeasurementError(
+            folder, "scan.slices",
+            f"holds one image only; where its pages are the slices, name the file itself: {folder.name}/{images[0].name}",
+        )  # fmt: skip
     if not numbered:
         raise MeasurementError(
             folder, "scan.slices", "no image has a number at the end of its name; number the slices"

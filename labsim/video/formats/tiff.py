@@ -10,6 +10,7 @@ import numpy as np
 import tifffile
 
 from ...errors import MeasurementError
+from ...tiff_pages import check_size, count_pages
 from ..frames import Frames
 
 NAME = "multipage TIFF"
@@ -21,9 +22,11 @@ def recognises(path: Path) -> bool:
 
 
 def open_file(path: Path) -> Frames:
+    count_pages(path)  # a chain without end is refused before tifffile follows it
     try:
         with tifffile.TiffFile(path) as file:
             count = len(file.pages)
+            check_size(path, "video", *file.pages[0].shape[:2])
             first = make_grey(file.pages[0].asarray(), path)
     except MeasurementError:
         raise
