@@ -12,9 +12,13 @@ from scipy.spatial import cKDTree
 from ..errors import MeasurementError
 from ..records import FloatArray, Scan
 from .bead_edge import REACH, WIDE, cut_box, find_widest, fit_blur, fit_clipped_edge, fit_wide_blur
+from .bead_size import measure_size, say_what_fits, warn_of_density, warn_of_size
 from .stack import SliceStack
 
 RAYS = 600
+COARSE_REACH = 2.0  # voxels by which the coarse volume of a saturated bead may be larger in radius
+LEAST_ABOVE = 1.2  # times the top of the range: grey level of a saturated bead whose mass says less
+COMPACTED = 2.0  # times the undisturbed dust's level: what may be compacted dust
 COARSE = 160  # voxels along the longest side of the coarse mask that is labelled
 
 
@@ -47,15 +51,24 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
     top = 2**scan.bits - 1
     level = _bead_level(scan)
     threshold = min(0.5 * (scan.calibration.grey_air + level), 0.8 * top)
-    centre = _find_coarsely(stack, scan, threshold, stated)
+    dust = float(np.median(stack.slice(stack.count - 1)))
+    if threshold - scan.calibration.grey_air < COMPACTED * (dust - scan.calibration.grey_air):
+        # mass and radius make a bead hardly denser than the dust: what is brightest is the bead
+        brightest = max(float(stack.slice(k).max()) for k in range(0, stack.count, max(1, stack.count // 40)))
+        threshold = 0.5 * (dust + brightest)
+    centre, coarse = _find_coarsely(stack, scan, threshold, stated)
     half = int(np.ceil(stated + 7))
     box, origin = cut_box(stack, centre, half)
     middle = np.array(centre) - origin
     saturated = bool(np.median(_sample(box, middle, 0.5 * stated)) >= 0.98 * top)
-    if not saturated:
+    if saturated:  # it lies above the range, whatever its mass says
+        level = max(level, LEAST_ABOVE * top)
+    else:
         level = float(np.median(_sample(box, middle, 0.5 * stated)))
     directions = _spread_directions(RAYS)
-    if scan.projectile.tip != "sphere":
+    if scan.projectile.tip == "sphere":
+        _check_radius(scan, coarse, stated, COARSE_REACH if saturated else 0.0)
+    else:
         directions = directions[directions[:, 2] > 0.1]  # the rod hides the upper half
     fit, rms, outside = middle, 0.0, np.zeros(len(directions))
     radius = stated
@@ -65,24 +78,18 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
             raise MeasurementError(
                 scan.slices,
                 "projectile.radius_mm",
-                "the bead has no round edge; check radius_mm and voxel_um",
+                f"the bead has no round edge of {stated:.2f} voxels' radius; its volume is that of {coarse:.2f}: "
+                + say_what_fits(scan, coarse),
             )
         fit, radius, rms = _fit_sphere(points[used])
-    # where the half level is clipped the radius reads large by up to two blurs
-    if abs(radius - stated) > 0.15 * stated + (REACH if saturated else 0.0):
-        raise MeasurementError(
-            scan.slices,
-            "projectile.radius_mm",
-            f"the bead's radius is {radius:.2f} voxels, radius_mm / voxel_um gives {stated:.2f}; correct one of them",
-        )
-    warnings = []
-    if (
-        abs(radius / stated - 1) > 0.03 and not saturated
-    ):  # where the half level is clipped the radius reads large
-        warnings.append(
-            f"the bead's radius is {radius:.2f} voxels but {stated:.2f} are stated: voxel size or radius is off"
-        )
+    _check_radius(scan, radius, stated, REACH if saturated else 0.0)
     tree = cKDTree(directions)
+    size = measure_size(box, fit, radius, level, top, directions, outside, tree)
+    warnings = warn_of_density(scan, top if saturated else level, saturated)
+    if size is not None:
+        warnings += warn_of_size(scan, *size, saturated)
+    elif not saturated:  # where the half level is clipped the radius reads large
+        warnings += warn_of_size(scan, radius, None, saturated)
     if (
         saturated
     ):  # the half level may be cut off; the whole edge, clipped as it was recorded, still tells the centre
@@ -99,6 +106,16 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
     return Bead((x, y, k), radius, stated, rms, lateral, axial, saturated, tuple(warnings))
 
 
+def _check_radius(scan: Scan, radius: float, stated: float, slack: float) -> None:
+    """slack : voxels by which the radius reads large where the half level is clipped, up to two blurs."""
+    if abs(radius - stated) > 0.15 * stated + slack:
+        raise MeasurementError(
+            scan.slices,
+            "projectile.radius_mm",
+            f"the bead's radius is {radius:.2f} voxels, radius_mm / voxel_um gives {stated:.2f}; {say_what_fits(scan, radius)}",
+        )
+
+
 def _bead_level(scan: Scan) -> float:
     """Grey level that the bead's density would have; a bead of another material is only roughly there."""
     radius = scan.projectile.tip_radius
@@ -109,7 +126,8 @@ def _bead_level(scan: Scan) -> float:
 
 def _find_coarsely(
     stack: SliceStack, scan: Scan, threshold: float, stated: float
-) -> tuple[float, float, float]:
+) -> tuple[tuple[float, float, float], float]:
+    """Middle of the bright body, and the radius of a sphere of its volume, voxels."""
     ny, nx = stack.shape
     # a block holds at least a few voxels but stays well below the bead's radius
     step = max(1, min(int(np.ceil(max(ny, nx, stack.count) / COARSE)), int(stated / 3)))
@@ -148,7 +166,8 @@ def _find_coarsely(
     k, y, x = (found.mean(0) + 0.5) * step - 0.5
     if rod:
         k = high[0] - 1 - stated
-    return float(x), float(y), float(k)
+    radius = step * (3 * sizes[beads[0] - 1] / (4 * np.pi)) ** (1 / 3)
+    return (float(x), float(y), float(k)), float(radius)
 
 
 def _spread_directions(n: int) -> FloatArray:

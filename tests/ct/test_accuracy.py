@@ -1,6 +1,7 @@
 """Against phantoms whose truth is known, and labelled scans of an independent simulator."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from labsim.campaign import read_scan
 from labsim.ct import balance_mass, compress, count_voxels, reduce_scan
 from labsim.ct.grey import to_filling_factor
 from labsim.ct.phantom import Phantom
+from labsim.errors import MeasurementError
 
 DATA = Path(__file__).parents[2] / "data" / "ct" / "labelled_scans"
 VOXEL = 37e-6
@@ -192,3 +194,53 @@ def test_labelled_scans(name):
     assert np.abs(np.array(reduced.map.axis_px) - truth["axis_px"]).max() <= 0.3
     assert reduced.map.tip_depth * 1e3 == pytest.approx(-truth["tip_z_mm"], abs=0.03)
     assert reduced.undisturbed.value == pytest.approx(0.15, abs=0.002)
+
+
+def change(scan, voxel=1.0, radius=1.0, mass=1.0):
+    p = scan.projectile
+    return replace(
+        scan,
+        voxel=scan.voxel * voxel,
+        projectile=replace(p, tip_radius=p.tip_radius * radius, mass=p.mass * mass),
+    )
+
+
+WRONG_BEADS = {
+    "radius": ({"radius": 1.5}, r"radius is 1\d\.\d\d voxels.*would fit|radius_mm / voxel_um.*would fit"),
+    "radius of the same glass": ({"radius": 1.5, "mass": 1.5**3}, "radius_mm / voxel_um.*would fit"),
+    "voxel": ({"voxel": 1.05}, r"radius_mm = 0\.5[123]\d* or voxel_um = [34]\d\.?\d* would fit"),
+    "voxel and radius": (
+        {"voxel": 2.0, "radius": 2.0},
+        r"mass_mg and radius_mm make 31\d.*radius_mm (below|=) 0\.[4-7]\d+",
+    ),
+    "voxel and radius, small": ({"voxel": 0.5, "radius": 0.5}, "mass_mg and radius_mm make 203"),
+}
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    """Scans whose beads saturate (a labelled one) and do not (a phantom)."""
+    folder = tmp_path_factory.mktemp("beads") / "slices"
+    return {"saturated": read_scan(DATA / "p01-C01"), "not saturated": Phantom().write(folder)}
+
+
+@pytest.mark.parametrize("kind", ["saturated", "not saturated"])
+@pytest.mark.parametrize("name", WRONG_BEADS)
+def test_a_bead_that_contradicts_what_is_stated(scans, kind, name):
+    changes, words = WRONG_BEADS[name]
+    try:
+        said = "; ".join(reduce_scan(change(scans[kind], **changes)).map.warnings)
+    except MeasurementError as trouble:
+        said = str(trouble)
+    assert re.search(words, said), said
+
+
+def test_a_sound_bead_is_left_in_peace(scans, reduced_phantoms):
+    assert reduce_scan(scans["saturated"]).map.warnings == (
+        "the bead is saturated: its own density cannot be read",
+    )
+    assert reduced_phantoms()[1].map.warnings == ()
+    said = reduced_phantoms(saturated=True)[
+        1
+    ].map.warnings  # its edge reads 1 voxel large where it is clipped
+    assert not any("radius" in text or "high" in text and "wide" in text for text in said)
