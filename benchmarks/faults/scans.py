@@ -12,6 +12,7 @@ says beyond what it says of the sound scan: an error or the warnings. "silent" i
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 import tempfile
@@ -20,6 +21,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import tifffile
 from scipy import ndimage
 
 from labsim.campaign import read_scan
@@ -52,7 +54,7 @@ class Case:
 def render(case: Case, seed: int = 0) -> tuple[Phantom, np.ndarray]:
     """The phantom and its grey levels with the case's fault in them."""
     phantom = Phantom(**{"noise": 0.0, "seed": seed, **case.phantom})
-    fine = replace(phantom, bits=16)
+    fine = replace(phantom, bits=16, saturated=False)
     solid = fine.calibration.grey_per_density * fine.calibration.density_solid
     phi = (fine.grey() - fine.calibration.grey_air) / solid
     rng = np.random.default_rng(seed)
@@ -240,6 +242,13 @@ def _cut(files: list[bytes], other: list[bytes], at: int, length: int) -> list[b
     return [data[:length] if k == at else data for k, data in enumerate(files)]
 
 
+def _black(data: bytes) -> bytes:
+    image = np.zeros_like(tifffile.imread(io.BytesIO(data)))
+    stream = io.BytesIO()
+    tifffile.imwrite(stream, image)
+    return stream.getvalue()
+
+
 DAMAGE: dict[str, Callable[[list[bytes], list[bytes]], list[bytes]]] = {
     "sound": lambda f, o: f,
     "two slices swapped, beside the bead (40, 44)": lambda f, o: _swap(f, o, 40, 44),
@@ -255,6 +264,7 @@ DAMAGE: dict[str, Callable[[list[bytes], list[bytes]], list[bytes]]] = {
     "one slice of another scan (50)": lambda f, o: _replace(f, o, 50, 51),
     "lower half of another scan (54)": lambda f, o: _replace(f, o, 54, len(f)),
     "lower half of another scan (40)": lambda f, o: _replace(f, o, 40, len(f)),
+    "a black slice (70)": lambda f, o: [*f[:70], _black(f[70]), *f[71:]],
     "an empty slice (60)": lambda f, o: _cut(f, o, 60, 0),
     "a truncated slice (60)": lambda f, o: _cut(f, o, 60, 2000),
 }

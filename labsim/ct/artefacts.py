@@ -18,7 +18,7 @@ class Cupping:
     """Dust's grey against the distance rho from the scanner's axis, a + b rho^2, below and away from the bead.
 
     amount : grey levels between the middle and the rim, sigma its uncertainty; left_over : rms of the radial profile
-    after the fit; image : (ny, nx) to subtract, zero on average over the slice.
+    after the fit; image : (ny, nx) what the cup adds, zero on average over the slice, where the dust's mean is ``level``.
     """
 
     amount: float = 0.0
@@ -26,13 +26,13 @@ class Cupping:
     left_over: float = 0.0
     followed: bool = False
     image: FloatArray | float = 0.0
+    level: float = float("nan")
 
 
 def fit_cupping(stack: SliceStack, axis: tuple[float, float], bead: Bead, surface: Surface) -> Cupping:
     """Fit a parabola (and a fourth power where it helps) to the deep slices; followed from 4 sigma and 0.3 % of dust."""
     ny, nx = stack.shape
-    start = int(bead.centre[2] + 3.2 * bead.stated_radius)
-    start = max(start, int(surface.row + 8))
+    start = _find_deep(stack, bead, surface)
     if stack.count - start < 4:
         return Cupping()
     deep = np.zeros((ny, nx))
@@ -64,7 +64,48 @@ def fit_cupping(stack: SliceStack, axis: tuple[float, float], bead: Bead, surfac
     full = sum(c * np.minimum(rho, 1.2) ** p for c, p in zip(solution[1:], (2, 4), strict=False))
     full = full - full[inside].mean()
     followed = abs(amount) > 4 * sigma and abs(amount) > 0.003 * (surface.dust - surface.air)
-    return Cupping(amount, sigma, left_over, followed, full.astype(np.float32) if followed else 0.0)
+    level = float(deep[inside].mean())
+    return Cupping(amount, sigma, left_over, followed, full.astype(np.float32) if followed else 0.0, level)
+
+
+def remove_cupping(grey: FloatArray, cupping: Cupping, surface: Surface) -> FloatArray:
+    """One slice with dust as bright in the middle as at the rim: beam hardening lowers a level by a share of itself."""
+    return surface.air + (grey - surface.air) / (1 + cupping.image / (cupping.level - surface.air))
+
+
+def measure_rings(
+    stack: SliceStack, bead: Bead, surface: Surface, cupping: Cupping
+) -> tuple[FloatArray | None, float]:
+    """Rings that all slices share, from the undisturbed dust below the bead: (ny, nx) grey levels to take off, and the
+    standard error of the dust's level that is left, since the rings themselves have an unknown mean.
+
+    There every radius should read alike, so that rings of any width show. None where they are within the noise.
+    """
+    start = _find_deep(stack, bead, surface)
+    if stack.count - start < 4:
+        return None, 0.0
+    rows = range(start, stack.count)
+    deep = np.mean([stack.slice(k) for k in rows], axis=0, dtype=np.float64)
+    if cupping.followed:
+        deep = remove_cupping(deep, cupping, surface)
+    index, reach = _ring_index(*deep.shape)
+    inside = index < reach
+    count = np.bincount(index[inside], minlength=reach)
+    profile = np.bincount(index[inside], deep[inside], reach) / np.maximum(count, 1)
+    ring = profile - np.median(profile)
+    expected = surface.dust_scatter / np.sqrt(np.maximum(count, 1) * len(rows))
+    if np.mean((ring / expected) ** 2) < 3.0:
+        return None, 0.0
+    spread = 1.48 * float(
+        np.median(np.abs(ring))
+    )  # of most radii: a few strong rings leave the median where it was
+    level_sigma = 1.25 * spread / np.sqrt(reach)
+    return np.where(inside, ring[np.minimum(index, reach - 1)], 0.0).astype(np.float32), level_sigma
+
+
+def _find_deep(stack: SliceStack, bead: Bead, surface: Surface) -> int:
+    """First slice of the dust that the bead did not reach."""
+    return max(int(bead.centre[2] + 3.2 * bead.stated_radius), int(surface.row + 8))
 
 
 def remove_rings(grey: FloatArray, hidden: np.ndarray | None, noise: float) -> tuple[FloatArray, float]:

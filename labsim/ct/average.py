@@ -9,6 +9,10 @@ import numpy as np
 from ..records import FloatArray
 
 SECTORS = 8
+MORE_SCATTER = 1.5  # chi2 per undisturbed cell from which sigma is widened to it; honest ones have 1.0 +- 0.1
+LEAST_SCATTER = (
+    5e-4  # filling factor; less is what cupping and strain of the dust leave in slices without noise
+)
 MODEL_WEIGHT = 40.0  # degrees of freedom that the noise model counts beside the 7 of eight sectors
 
 
@@ -32,12 +36,17 @@ class SectorSums:
 
 
 class SectorAverage:
-    """Adds slices one by one; the axis may lean (``tilt``: change of x and y, in voxels, per slice downwards)."""
+    """Adds slices one by one; the axis may lean (``tilt``: change of x and y, in voxels, per slice downwards).
+
+    slope : of a leaning surface (slices per pixel along x and y); rows are then counted along its normal, from the axis'
+    slice, and the lean of the axis is against the normal.
+    """
 
     def __init__(
         self, shape: tuple[int, int], count: int, axis: tuple[float, float, float], cell: int, reach: float,
-        tilt: tuple[float, float] = (0.0, 0.0),
+        tilt: tuple[float, float] = (0.0, 0.0), slope: tuple[float, float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
+        self.slope = slope
         self.axis, self.cell, self.tilt, self.shape = axis, cell, tilt, shape
         self.nr, self.nz = max(1, int(reach // cell)), count // cell
         size = (self.nz, self.nr * SECTORS)
@@ -60,6 +69,9 @@ class SectorAverage:
 
     def add(self, k: int, values: FloatArray, hidden: np.ndarray | None) -> None:
         """Add slice k. hidden : (ny, nx) bool, voxels of the bead and its guard, or None."""
+        if self.slope != (0.0, 0.0):
+            self._add_leaning(k, values, hidden)
+            return
         row = k // self.cell
         if row >= self.nz:
             return
@@ -74,6 +86,30 @@ class SectorAverage:
         self.square[row] += np.bincount(flat, v * v, length)[:-1]
         self.voxels[row] += np.bincount(flat, minlength=length)[:-1]
 
+    def _add_leaning(self, k: int, values: FloatArray, hidden: np.ndarray | None) -> None:
+        """The same where the rows of the map cross the slices."""
+        x = np.arange(self.shape[1])[None, :] - self.axis[0]
+        y = np.arange(self.shape[0])[:, None] - self.axis[1]
+        down = np.array([-self.slope[0], -self.slope[1], 1.0])
+        down /= np.linalg.norm(down)
+        height = x * down[0] + y * down[1] + (k - self.axis[2]) * down[2]
+        x = x - height * (down[0] + self.tilt[0])
+        y = y - height * (down[1] + self.tilt[1])
+        above = (k - self.axis[2]) - height * down[2]
+        bins = (np.sqrt(x**2 + y**2 + above**2) / self.cell).astype(int)
+        row = np.floor((self.axis[2] + height + 0.5) / self.cell).astype(int)
+        sector = ((np.arctan2(y, x) + np.pi) * (SECTORS / (2 * np.pi))).astype(int) % SECTORS
+        inside = (bins < self.nr) & (row >= 0) & (row < self.nz)
+        index = (row * self.nr + bins) * SECTORS + sector
+        seen = inside if hidden is None else inside & ~hidden
+        v, at = np.asarray(values, float)[seen], index[seen]
+        size = self.total.size
+        self.total += np.bincount(at, v, size).reshape(self.total.shape)
+        self.square += np.bincount(at, v * v, size).reshape(self.total.shape)
+        self.voxels += np.bincount(at, minlength=size).reshape(self.total.shape)
+        if hidden is not None:
+            self.masked += np.bincount(index[inside & hidden], minlength=size).reshape(self.total.shape)
+
     def sums(self) -> SectorSums:
         fold = (self.nz, self.nr, SECTORS)
         parts = (a.reshape(fold) for a in (self.total, self.square, self.voxels, self.masked))
@@ -83,7 +119,8 @@ class SectorAverage:
 @dataclass(frozen=True)
 class CellErrors:
     """sigma : (nz, nr); asymmetry : (nz, nr) largest minus smallest sector; voxel_noise : one voxel, undisturbed dust;
-    excess : sector-to-sector standard deviation beyond voxel noise; correlation_r, correlation_z : between neighbours.
+    excess : sector-to-sector standard deviation beyond voxel noise; correlation_r, correlation_z : between neighbours;
+    model : (nz, nr) what the noise model alone gives.
     """
 
     sigma: FloatArray
@@ -92,6 +129,10 @@ class CellErrors:
     excess: float
     correlation_r: float
     correlation_z: float
+    model: FloatArray
+    scatter: (
+        float  # standard deviation of undisturbed cells beyond their sigma, in filling factor; part of sigma
+    )
 
 
 def estimate_errors(sums: SectorSums, undisturbed: np.ndarray) -> CellErrors:
@@ -130,11 +171,21 @@ def estimate_errors(sums: SectorSums, undisturbed: np.ndarray) -> CellErrors:
     high = np.where(used, sector_mean, -np.inf).max(2)
     low = np.where(used, sector_mean, np.inf).min(2)
     asymmetry = np.where(n > 0, high - low, np.nan)
-    white, share = _whiten(np.where(good, sums.mean(), np.nan), sigma)
+    level = np.where(good, sums.mean(), np.nan)
+    white, share = _whiten(level, sigma)
+    scatter = 0.0
+    if np.isfinite(white).sum() > 100 and np.nanmean(white**2) > (1 - share) * MORE_SCATTER:
+        beyond = (white**2 / (1 - share) - 1) * sigma**2
+        scatter = float(np.sqrt(max(np.nanmean(beyond), 0.0)))
+        scatter = scatter if scatter > LEAST_SCATTER else 0.0
+        sigma = np.hypot(sigma, scatter)
+        white, share = _whiten(level, sigma)
     correlation_r, correlation_z = _lag(white, 1), _lag(white, 0)
     # the mean taken out of every row is made of these cells themselves
     correlation_r = correlation_r * (1 - share) + share
-    return CellErrors(sigma, asymmetry, noise, float(np.sqrt(a)), correlation_r, correlation_z)
+    return CellErrors(
+        sigma, asymmetry, noise, float(np.sqrt(a)), correlation_r, correlation_z, np.sqrt(model), scatter
+    )
 
 
 def _whiten(level: FloatArray, sigma: FloatArray) -> tuple[FloatArray, float]:
@@ -193,4 +244,6 @@ def fit_tilt(
         tilt.append(
             float((weight * expected * residual[full]).sum() / information) if information > 0 else 0.0
         )
-    return (tilt[0], tilt[1]), information**-0.5 if information > 0 else float("inf")
+    # what the undisturbed cells scatter beyond noise moves the axis too
+    more = float(np.hypot(1.0, errors.scatter / np.median(errors.model[full])))
+    return (tilt[0], tilt[1]), more * information**-0.5 if information > 0 else float("inf")

@@ -13,6 +13,7 @@ from ..errors import MeasurementError
 from ..records import FloatArray, Scan
 from .bead_edge import REACH, WIDE, cut_box, find_widest, fit_blur, fit_clipped_edge, fit_wide_blur
 from .bead_size import measure_size, say_what_fits, warn_of_density, warn_of_size
+from .neighbours import find_bright_jumps
 from .stack import SliceStack
 
 RAYS = 600
@@ -133,7 +134,9 @@ def _find_coarsely(
     step = max(1, min(int(np.ceil(max(ny, nx, stack.count) / COARSE)), int(stated / 3)))
     rows, columns = ny // step * step, nx // step * step
     mask = np.zeros((-(-stack.count // step), rows // step, columns // step), np.float32)
+    area = np.zeros(stack.count)
     for k, image in enumerate(stack):
+        area[k] = (image > threshold).sum()
         above = (image[:rows, :columns] > threshold).reshape(rows // step, step, columns // step, step)
         mask[k // step] += above.sum((1, 3))
     labels, number = ndimage.label(mask > 0.5 * step**3)
@@ -148,10 +151,16 @@ def _find_coarsely(
             "check radius_mm, voxel_um and the calibration",
         )
     if len(beads) > 1:
+        jumps = [f"{stack.name(k)} and {stack.name(k + 1)}" for k in find_bright_jumps(area)]
         raise MeasurementError(
             scan.slices,
             "projectile",
-            f"{len(beads)} bright bodies of the bead's size; cut the slices so that one bead is in view",
+            f"{len(beads)} bright bodies of the bead's size; "
+            + (
+                f"they break off between {', '.join(jumps[:4])}: slices are out of order or of another scan"
+                if jumps
+                else "cut the slices so that one bead is in view"
+            ),
         )
     found = np.argwhere(labels == beads[0])
     low, high = found.min(0) * step, (found.max(0) + 1) * step

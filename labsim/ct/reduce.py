@@ -9,18 +9,25 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FillingMap, FloatArray, Measured, Scan
-from .artefacts import Cupping, fit_cupping, remove_rings
+from .artefacts import Cupping, fit_cupping, measure_rings, remove_cupping, remove_rings
 from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
 from .bead import Bead, find_bead
 from .bead_edge import WIDE, find_widest
 from .grey import GreyCheck, check_grey, check_levels, to_filling_factor, warn_of_grey
+from .neighbours import check_neighbours, find_doubled
 from .stack import SliceStack, open_stack
 from .surface import Surface, find_surface
+from .systematic import find_directions, find_halo
+from .undisturbed import average_undisturbed, find_undisturbed
 
 CELL = 2  # voxels along an edge of a cell
 GUARD = 3.0  # voxels about the bead that belong to its point spread, not to the dust
 GUARD_BLURS = 3.5  # the same in standard deviations of a wide point spread
 TILT_SEEN = (4.0, np.deg2rad(0.4))  # a lean is followed where it is this many sigma and at least this large
+STRONG_CUP = 0.15  # share of the dust's level
+STRONG_CUP_WORDS = (
+    ", so much that the level about the bead is only as sure as its shape; correct it in the reconstruction"
+)
 RINGS_SEEN = 0.3  # share of the slices that must show rings before any are taken out
 
 
@@ -93,6 +100,7 @@ def reduce_scan(
             scan.slices, "scan.voxel_um",
             f"is {scan.voxel * 1e6:g} but the files state {stack.voxel * 1e6:g}; correct scan.toml",
         )  # fmt: skip
+    find_doubled(stack)
     report(0, 4, "bead")
     bead = find_bead(stack, scan)
     warnings += bead.warnings
@@ -105,7 +113,10 @@ def reduce_scan(
     report(1, 4, "surface")
     x, y, k_bead = bead.centre
     surface = find_surface(stack, (x, y), k_bead, bead.stated_radius)
+    if scan.projectile.tip == "sphere":
+        warnings += check_neighbours(stack, bead, surface, 2**scan.bits - 1)
     report(2, 4, "azimuthal mean")
+    surface_row = surface.along_normal(k_bead)
     ny, nx = stack.shape
     reach = min(x, y, nx - 1 - x, ny - 1 - y) + 0.5
     cupping, ring_rms = Cupping(), 0.0
@@ -113,19 +124,25 @@ def reduce_scan(
     if correct:
         cupping = fit_cupping(stack, (x, y), bead, surface)
         if cupping.followed:
+            share = cupping.amount / (surface.dust - surface.air)
             warnings.append(
-                f"cupping removed: {cupping.amount / (surface.dust - surface.air):.1%} of the dust's level"
+                f"cupping removed: {share:.1%} of the dust's level"
+                + (STRONG_CUP_WORDS if abs(share) > STRONG_CUP else "")
             )
+    shared: np.ndarray | None = None  # rings that all slices have
+    ring_sigma = 0.0
 
     def average(tilt: tuple[float, float], rings_too: bool = True) -> tuple[SectorAverage, float]:
-        sums = SectorAverage((ny, nx), stack.count, (x, y, k_bead), cell, reach, tilt)
+        sums = SectorAverage((ny, nx), stack.count, (x, y, k_bead), cell, reach, tilt, surface.slope)
         rings = []
         for k, image in enumerate(stack):
             mask = hidden(k, tilt)
             grey = image.astype(np.float32)
             if correct:
                 if cupping.followed and k > surface.row:
-                    grey -= cupping.image
+                    grey = remove_cupping(grey, cupping, surface)
+                if shared is not None and k > surface.row + 2:
+                    grey = grey - shared
                 if rings_too and k > surface.row + 2:
                     grey, rms = remove_rings(grey, mask, surface.dust_scatter)
                     rings.append(rms)
@@ -136,9 +153,13 @@ def reduce_scan(
 
     sums, ring_rms = average((0.0, 0.0))
     if ring_rms > 0:
+        shared, ring_sigma = measure_rings(stack, bead, surface, cupping)
+        if shared is not None:
+            sums, left = average((0.0, 0.0))
+            ring_rms = float(np.hypot(left, shared.std()))
         warnings.append(f"rings removed: {ring_rms:.2f} grey levels rms")
     rows = (np.arange(sums.nz) + 0.5) * cell - 0.5
-    undisturbed_cells = _undisturbed_cells(sums, rows, bead, surface)
+    undisturbed_cells = find_undisturbed(sums, rows, bead, surface_row + 6 + 3 * surface.width)
     errors = estimate_errors(sums.sums(), undisturbed_cells)
     tilt, tilt_sigma = fit_tilt(sums.sums(), errors, k_bead, rows, 3.0 * bead.stated_radius)
     size = float(np.hypot(*tilt))
@@ -160,11 +181,11 @@ def reduce_scan(
     report(3, 4, "map")
     voxel = scan.voxel
     r = (np.arange(sums.nr) + 0.5) * cell * voxel
-    z = (surface.row - rows) * voxel
+    z = (surface_row - rows) * voxel
     parts = sums.sums()
     count = parts.count.sum(2)
     phi, sigma = parts.mean(), errors.sigma.copy()
-    tip_depth = (k_bead + bead.stated_radius - surface.row) * voxel
+    tip_depth = (k_bead + bead.stated_radius - surface_row) * voxel
     rod = scan.projectile.tip != "sphere"
     masked = mask_near_bead(
         r,
@@ -176,7 +197,27 @@ def reduce_scan(
         rod=rod,
     )
     phi[masked], sigma[masked] = np.nan, np.nan
-    level, level_sigma = _undisturbed_level(phi, sigma, undisturbed_cells & ~masked)
+    height = bead.centre[2] - rows
+    near = (np.hypot(r / voxel, height[:, None]) < 2.5 * bead.stated_radius) & ~masked
+    systematic = [
+        find_directions(parts, errors, near, 0.5 * bead.stated_radius / cell),
+        find_halo(
+            phi, sigma, r / voxel, height, bead.stated_radius, guard, 3.0 * bead.stated_radius,
+            rows > surface_row + 2 + 2 * surface.width,
+        ),
+    ]  # fmt: skip
+    for each in systematic:
+        sigma = np.hypot(sigma, each.size)
+        warnings += each.warnings
+    if errors.scatter > 0:
+        warnings.append(
+            f"undisturbed cells scatter by {errors.scatter:.4f} more than noise explains (rings, layers in the picture?): "
+            "their error bars are widened to it"
+        )
+    # rings leave the level of all dust uncertain
+    common = ring_sigma / (scan.calibration.grey_per_density * scan.calibration.density_solid)
+    sigma[rows > surface_row] = np.hypot(sigma[rows > surface_row], common)
+    level, level_sigma = average_undisturbed(phi, sigma, undisturbed_cells & ~masked)
     grey = check_grey(stack, scan, surface, hidden, level, sample_filling_factor)
     warnings += warn_of_grey(grey, surface, bead, scan, level)
     if not 0 < level < 1:
@@ -184,9 +225,10 @@ def reduce_scan(
             scan.slices, "calibration.grey_per_density",
             f"gives a filling factor of {level:.3f} for the undisturbed dust; it must lie between 0 and 1",
         )  # fmt: skip
-    if surface.tilt > np.deg2rad(1.5):
+    if surface.leans:
         warnings.append(
-            f"the dust's surface leans by {np.rad2deg(surface.tilt):.1f} degrees against the slices"
+            f"the dust's surface leans by {np.rad2deg(np.arctan(surface.tilt)):.1f} degrees against the slices; heights are "
+            "counted along its normal"
         )
     filling = FillingMap(
         r,
@@ -202,7 +244,8 @@ def reduce_scan(
     report(4, 4, "map")
     return ReducedScan(
         scan=scan, map=filling, errors=replace(errors, sigma=sigma), bead=bead, surface=surface, grey=grey,
-        undisturbed=Measured(level, level_sigma), voxel_noise=errors.voxel_noise, blur=bead.blur_lateral * voxel,
+        undisturbed=Measured(level, float(np.hypot(level_sigma, common))),
+        voxel_noise=errors.voxel_noise, blur=bead.blur_lateral * voxel,
         tilt=(float(np.arctan(tilt[0])), float(np.arctan(tilt[1]))), tilt_sigma=float(tilt_sigma),
         tilt_followed=bool(followed), cupping=cupping, ring_rms=ring_rms, masked=masked,
         facts={**stack.facts, "slices": stack.count, "shape": list(stack.shape), "cell": cell, "guard": guard},
@@ -249,27 +292,3 @@ def _bead_mask(stack: SliceStack, scan: Scan, bead: Bead, guard: float) -> Calla
         return (x - x0 - dx) ** 2 + (y - y0 - dy) ** 2 + height**2 < radius**2
 
     return hidden
-
-
-def _undisturbed_cells(sums: SectorAverage, rows: FloatArray, bead: Bead, surface: Surface) -> np.ndarray:
-    """Dust far below the bead; where the stack ends there, dust far beside it."""
-    r = (np.arange(sums.nr) + 0.5) * sums.cell
-    distance = np.hypot(r[None, :], (rows - bead.centre[2])[:, None])
-    deep = (rows[:, None] > surface.row + 6 + 3 * surface.width) & (distance > 3.5 * bead.stated_radius)
-    below = deep & (rows[:, None] > bead.centre[2] + 3.5 * bead.stated_radius)
-    cells = below if below.sum() > 60 else deep
-    if cells.sum() < 30:
-        raise MeasurementError(
-            "scan",
-            "scan.slices",
-            "no undisturbed dust is in view (3.5 bead radii away); export more slices below the bead",
-        )
-    return cells
-
-
-def _undisturbed_level(phi: FloatArray, sigma: FloatArray, cells: np.ndarray) -> tuple[float, float]:
-    good = cells & np.isfinite(phi) & (sigma > 0)
-    weight = 1 / sigma[good] ** 2
-    mean = float(np.average(phi[good], weights=weight))
-    scatter = float(np.average((phi[good] - mean) ** 2, weights=weight) / np.mean(1 / weight))
-    return mean, float(np.sqrt(max(1.0, scatter) / weight.sum()))

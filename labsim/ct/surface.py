@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,12 +10,16 @@ from ..errors import MeasurementError
 from ..records import FloatArray
 from .stack import SliceStack
 
+LEANS = np.deg2rad(1.5)  # lean of the surface that is followed; smaller ones change no cell by its sigma
+PASSES = 3  # in which the lean is refined
+
 
 @dataclass(frozen=True)
 class Surface:
-    """Free surface far from the bead. ``row`` is its slice number (whole numbers are slice centres).
+    """Free surface far from the bead. ``row`` is its slice number (whole numbers are slice centres), at the bead's axis.
 
-    tilt : rad, of a plane through four quadrants; width : voxels, standard deviation of the step across it;
+    slope : slices per pixel along x and y, of a surface that leans (LEANS), else zero; heights are then counted along its
+    normal. tilt : rad, of a plane through four quadrants; width : voxels, standard deviation of the step across it;
     air, dust : grey levels above and below; air_scatter, dust_scatter : grey, voxel to voxel.
     """
 
@@ -27,6 +31,15 @@ class Surface:
     dust: float
     air_scatter: float
     dust_scatter: float
+    slope: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def leans(self) -> bool:
+        return self.slope != (0.0, 0.0)
+
+    def along_normal(self, bead_row: float) -> float:
+        """The surface's row where rows are counted from the bead's along the surface's normal, one voxel each."""
+        return bead_row - (bead_row - self.row) / float(np.sqrt(1 + self.slope[0] ** 2 + self.slope[1] ** 2))
 
 
 def find_surface(
@@ -51,6 +64,40 @@ def find_surface(
             "no dust far from the bead is in view on one side; export wider slices",
         )
     profile = np.array([[image[q].mean() for q in quadrants] for image in stack])
+    found = _fit_step(profile, stack, far, x, y, axis)
+    slope = (0.0, 0.0)
+    if found.tilt > LEANS:
+        for _ in range(PASSES):
+            slope = (slope[0] + found.slope[0], slope[1] + found.slope[1])
+            plane = slope[0] * (x - axis[0]) + slope[1] * (y - axis[1])
+            found = _fit_step(_relative_profile(stack, quadrants, plane), stack, far, x, y, axis)
+        return replace(found, slope=slope, tilt=float(np.hypot(*slope)))
+    return replace(found, slope=slope)
+
+
+def _relative_profile(stack: SliceStack, quadrants: list[np.ndarray], plane: FloatArray) -> FloatArray:
+    """Mean grey over each quadrant against the height over a leaning plane, (slices, 4); the ends as far as they are seen."""
+    size = (stack.count, len(quadrants))
+    total, number = np.zeros(size), np.zeros(size)
+    for k, image in enumerate(stack):
+        row = np.rint(k - plane).astype(int)
+        for q, quadrant in enumerate(quadrants):
+            at = row[quadrant]
+            inside = (at >= 0) & (at < stack.count)
+            total[:, q] += np.bincount(at[inside], image[quadrant][inside], stack.count)
+            number[:, q] += np.bincount(at[inside], minlength=stack.count)
+    return total / np.maximum(number, 1)
+
+
+def _fit_step(
+    profile: FloatArray,
+    stack: SliceStack,
+    far: np.ndarray,
+    x: FloatArray,
+    y: FloatArray,
+    axis: tuple[float, float],
+) -> Surface:
+    """The step from air to dust in the profiles of four quadrants; ``slope`` is what they still differ by."""
     mean = profile.mean(1)
     edge = max(2, stack.count // 30)
     above, below = float(mean[:edge].mean()), float(mean[-edge:].mean())
@@ -86,7 +133,10 @@ def find_surface(
     air_scatter = float(stack.slice(0)[far].std())
     dust_scatter = float(stack.slice(stack.count - 1)[far].std())
     row_sigma = float(max(rows.std(ddof=1) / 2, 0.01))
-    return Surface(row, row_sigma, float(np.hypot(gx, gy) / arm), width, air, dust, air_scatter, dust_scatter)
+    return Surface(
+        row, row_sigma, float(np.hypot(gx, gy) / arm), width, air, dust, air_scatter, dust_scatter,
+        (float(gx / arm), float(gy / arm)),
+    )  # fmt: skip
 
 
 def _cross(profile: FloatArray, level: float, near: int) -> float:

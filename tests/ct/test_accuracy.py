@@ -243,4 +243,4 @@ def test_a_sound_bead_is_left_in_peace(scans, reduced_phantoms):
     said = reduced_phantoms(saturated=True)[
         1
     ].map.warnings  # its edge reads 1 voxel large where it is clipped
-    assert not any("radius" in text or "high" in text and "wide" in text for text in said)
+    assert not any("radius" in text or ("high" in text and "wide" in text) for text in said)
