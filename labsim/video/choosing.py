@@ -1,19 +1,78 @@
-"""Which motion a track shows: rest or rebound, and the degree of its deceleration, by Akaike's criterion."""
+"""Which motion a track shows: rest or rebound and the degree of its deceleration, and what the choice leaves open."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray
-from .segments import Motion, fit_motion
+from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
+from .segments import Ending, Motion
 
 HIGHEST_DEGREE = 7
-WORTH = 2.0  # Akaike units by which a richer model must win
+STRIDE = 4  # frames over which a speed is guessed
+LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
+NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fitted motion and the frames it stands on, (n,) bool of those offered."""
+
+    motion: Motion
+    used: np.ndarray
+    chi_square: float  # with OUTLIER² for each frame left out
+    freedom: int
+
+    def judge(self, noise: float) -> float:
+        """Akaike's criterion with the small-sample term for a noise level of ``noise`` times the error bars, squared."""
+        n, p = len(self.used), len(self.motion.parameters)
+        if n <= p + 2:
+            return np.inf
+        return self.chi_square / noise + 2 * p + 2 * p * (p + 1) / (n - p - 1)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Models that explain the rows, best first, and their weights, which add up to one."""
+
+    candidates: tuple[Candidate, ...]
+    weights: FloatArray
+    goes_on: bool  # whether frames follow the greatest depth
+
+    @property
+    def best(self) -> Candidate:
+        return self.candidates[0]
+
+    def propagate(
+        self, quantity: Callable[[Motion, FloatArray], FloatArray | float], growth: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean over the models and its standard uncertainty: theirs, times √growth, and what they disagree.
+
+        ``quantity`` (motion, parameters) gives a number or an array; a model without it is left out.
+        """
+        values, variances, weights = [], [], []
+        for candidate, weight in zip(self.candidates, self.weights, strict=True):
+            motion = candidate.motion
+            value, sigma = motion.propagate(lambda p, motion=motion: quantity(motion, p))
+            if np.all(np.isfinite(value)):
+                values.append(value)
+                variances.append(growth * sigma**2)
+                weights.append(weight)
+        if not values:
+            return np.full(1, np.nan)[0], np.full(1, np.nan)[0]
+        share = np.array(weights) / np.sum(weights)
+        mean = np.tensordot(share, np.array(values), 1)
+        variance = np.tensordot(share, np.array(variances) + (np.array(values) - mean) ** 2, 1)
+        return mean, np.sqrt(variance)
 
 
 def guess_ends(time: FloatArray, depth: FloatArray, name: object) -> tuple[float, float]:
     """Rough contact (first crossing of the surface) and rough stop (first time near the greatest depth)."""
+    depth = follow_median(depth)
     below = np.flatnonzero(depth > 0)
     i = int(below[0])
     if i == 0:
@@ -24,47 +83,74 @@ def guess_ends(time: FloatArray, depth: FloatArray, name: object) -> tuple[float
         t0 = float(time[0])
     else:
         t0 = float(np.interp(0.0, depth[i - 1 : i + 1], time[i - 1 : i + 1]))
-    smooth = np.convolve(np.pad(depth, 2, mode="edge"), np.full(5, 0.2), mode="valid")
-    noise = 1.4826 * np.median(np.abs(np.diff(depth, 3))) / np.sqrt(20.0)
-    deepest = int(np.argmax(smooth))
-    near = np.flatnonzero((smooth >= smooth[deepest] - noise) & (time > t0))
-    te = float(time[near[0]]) if near.size else t0
-    return t0, max(te, t0 + 3 * float(np.median(np.diff(time))))
+    return t0, _guess_stop(time, depth, i, t0)
+
+
+def _guess_stop(time: FloatArray, depth: FloatArray, contact: int, t0: float) -> float:
+    """First time after contact at which the projectile goes on by less than 3 % of its free fall, or than noise hides."""
+    spacing = float(np.median(np.diff(time)))
+    pace = (depth[STRIDE:] - depth[:-STRIDE]) / (time[STRIDE:] - time[:-STRIDE])
+    noise = 1.4826 * float(np.median(np.abs(np.diff(depth, 3)))) / np.sqrt(20.0)
+    fast = float(np.median(pace[max(contact - 10, 0) : max(contact - STRIDE, 1)]))
+    slow = max(0.03 * fast, 2.0 * noise / (STRIDE * spacing))
+    still = pace < slow
+    rests = np.flatnonzero(still[contact:] & np.append(still[contact + 1 :], True))
+    if rests.size == 0:
+        return float(time[-1])
+    return max(float(time[contact + rests[0]]) + 0.5 * spacing, t0 + 3 * spacing)
 
 
 def choose_motion(
     time: FloatArray, depth: FloatArray, error: FloatArray, start: tuple[float, float]
-) -> Motion | None:
-    """The model with the least criterion among rest, rebound and, if nothing stops, an open end; simple ones first."""
+) -> Choice | None:
+    """Every model that explains the rows, weighed by Akaike's criterion (Burnham & Anderson 2002); None if none does.
+
+    Rest and rebound of all degrees; if nothing stops, an open end. Every frame left out costs a model OUTLIER² of χ², so that
+    models with different outliers can be compared.
+    """
     stops = time[-1] > start[1] + 2.5 * float(np.median(np.diff(time)))
     span = start[1] - start[0]
-    best: Motion | None = None
-    kinds = [(False, True), (True, True)] if stops else [(True, False)]
-    for rebound, ends in kinds:
-        lead = None
-        for degree in range(0 if not rebound else 1, HIGHEST_DEGREE + 1):
-            if lead is None:
-                starts = [
-                    (start[0], start[0] + factor * span)
-                    for factor in ((1.0, 1.15, 1.4) if rebound else (1.0, 1.15))
-                ]
-            else:
-                starts = [(lead.parameters[0], lead.parameters[1])]
+    first = ~guess_spikes(depth, error)
+    found: list[Candidate] = []
+    endings: tuple[Ending, ...] = ("rest", "ease", "rebound") if stops else ("open",)
+    for ending in endings:
+        lead: Candidate | None = None
+        for degree in range({"rest": 0, "ease": 1, "rebound": 1, "open": 1}[ending], HIGHEST_DEGREE + 1):
+            starts = [(start[0], start[0] + factor * span) for factor in (1.0, 1.2, 1.5)]
+            if lead is not None:
+                starts = [(lead.motion.parameters[0], lead.motion.parameters[1])]
+            here: Candidate | None = None
             for begin in starts:
-                motion = fit_motion(time, depth, error, degree, rebound, begin, ends)
-                if motion is None or (ends and not _is_sound(motion, time)):
-                    continue
-                if lead is None or motion.criterion < lead.criterion - (
-                    WORTH if motion.degree > lead.degree else 0
-                ):
-                    lead = motion
-            if lead is not None and degree > lead.degree + 2:
+                for used in [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]:
+                    fitted = fit_without_outliers(time, depth, error, degree, ending, begin, used)
+                    if fitted is None or (stops and not _is_sound(fitted[0], time)):
+                        continue
+                    candidate = _weigh_outliers(*fitted)
+                    if here is None or candidate.judge(1.0) < here.judge(1.0):
+                        here = candidate
+            if here is None:
+                continue
+            found.append(here)
+            if lead is None or here.judge(1.0) < lead.judge(1.0):
+                lead = here
+            if degree > lead.motion.degree + 2:
                 break
-        if lead is not None and (best is None or lead.criterion < best.criterion - 2 * WORTH):
-            best = lead
-    if best is None and stops:
-        return choose_motion(time[time <= start[1]], depth[time <= start[1]], error[time <= start[1]], start)
-    return best
+    found = [candidate for candidate in found if np.isfinite(candidate.judge(1.0))]
+    if not found:
+        return None
+    best = min(found, key=lambda candidate: candidate.judge(1.0))
+    noise = (best.motion.chi_square + NOISE_KNOWN) / (best.motion.freedom + NOISE_KNOWN)
+    found.sort(key=lambda candidate: candidate.judge(noise))
+    criteria = np.array([candidate.judge(noise) for candidate in found])
+    weights = np.exp(-0.5 * (criteria - criteria[0]))
+    kept = weights > LEAST_WEIGHT
+    return Choice(tuple(each for each, keep in zip(found, kept, strict=True) if keep), weights[kept] / weights[kept].sum(), stops)
+
+
+def _weigh_outliers(motion: Motion, used: np.ndarray) -> Candidate:
+    spread = max(1.0, motion.chi_square / max(motion.freedom, 1))
+    chi_square = motion.chi_square + OUTLIER**2 * spread * float(np.sum(~used))
+    return Candidate(motion, used, chi_square, motion.freedom)
 
 
 def _is_sound(motion: Motion, time: FloatArray) -> bool:
@@ -82,4 +168,4 @@ def _is_sound(motion: Motion, time: FloatArray) -> bool:
     if np.any(speed < -0.01 * v0) or np.any(speed > 1.1 * v0):
         return False
     error = np.sqrt(motion.covariance[1, 1])
-    return te < time[-1] and error < 0.5 * (te - t0) and np.all(np.diag(motion.covariance) >= 0)
+    return bool(te < time[-1] and error < 0.5 * (te - t0) and np.all(np.diag(motion.covariance) >= 0))

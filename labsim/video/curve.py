@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from ..errors import MeasurementError
 from ..records import Camera, DecelerationCurve, FloatArray, Measured, Track
 from .checks import fit_gravity, measure_alikeness
-from .choosing import choose_motion, guess_ends
-from .outliers import drop_isolated
+from .choosing import Choice, choose_motion, guess_ends
+from .outliers import follow_median
 from .segments import STANDARD_GRAVITY, Motion, fit_motion
 
 AFTER_STOP = 0.5  # share of the stopping time that is fitted beyond the stop
@@ -36,52 +35,39 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
             name, "tip_row_px", f"only {len(trusted)} trusted frames; a curve needs at least 12"
         )
     time, row, sigma = track.time[trusted], track.tip_row[trusted], track.sigma[trusted]
-    keep = drop_isolated(time, row, sigma)
     depth = (row - camera.surface_row) * camera.pixel_size
     error = sigma * camera.pixel_size
-    reach = float(np.max(depth[keep]))
-    if reach <= 3 * float(np.median(error)):
+    if float(np.max(follow_median(depth))) <= 3 * float(np.median(error)):
         raise MeasurementError(
             name,
             "tip_row_px",
-            f"never reaches the surface (lowest row {np.max(row[keep]):.1f}, surface row {camera.surface_row:.1f}); "
+            f"never reaches the surface (lowest row {np.max(follow_median(row)):.1f}, surface row {camera.surface_row:.1f}); "
             "check surface_row_px and that rows grow downwards",
         )
-    start = guess_ends(time[keep], depth[keep], name)
-    if not np.any(time[keep] < start[0] - 2 * np.median(np.diff(time))):
+    start = guess_ends(time, depth, name)
+    spacing = float(np.median(np.diff(time)))
+    if not np.any(time < start[0] - 2 * spacing):
         warnings.append(
             "fewer than three frames before contact: impact speed and contact time lean on the deceleration"
         )
     # what follows the first stop for long (a second landing, creep) is not part of the model
-    window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), 6.5 * float(np.median(np.diff(time))))
-    motion = None
-    for _ in range(4):
-        use = keep & window
-        motion = choose_motion(time[use], depth[use], error[use], start)
-        if motion is None:
-            raise MeasurementError(
-                name,
-                "tip_row_px",
-                "no motion of free flight and deceleration fits; look at the rows against the time",
-            )
-        misfit = (depth - motion.evaluate(time)[0]) / error
-        spread = max(1.0, 1.4826 * float(np.median(np.abs(misfit[use]))))
-        renewed = np.abs(misfit) < 5 * spread
-        if np.array_equal(renewed & window, use):
-            break
-        keep = renewed | ~window
-        if np.sum(keep & window) < 12:
-            raise MeasurementError(
-                name, "tip_row_px", "more than half of the frames are outliers; check the track"
-            )
-    assert motion is not None
-    use = keep & window
-    outliers = int(np.sum(~keep & window))
-    if outliers:
-        frames = ", ".join(str(f) for f in track.frame[trusted][~keep & window][:8])
-        many = "s" if outliers > 1 else ""
+    window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), 6.5 * spacing)
+    choice = choose_motion(time[window], depth[window], error[window], start)
+    if choice is None:
+        raise MeasurementError(
+            name,
+            "tip_row_px",
+            "no motion of free flight and deceleration fits; look at the rows against the time",
+        )
+    motion = choice.best.motion
+    use = np.zeros(len(time), bool)
+    use[window] = choice.best.used
+    outliers = np.flatnonzero(window & ~use)
+    if outliers.size:
+        frames = ", ".join(str(f) for f in track.frame[trusted][outliers][:8])
+        many = "s" if outliers.size > 1 else ""
         warnings.append(
-            f"{outliers} outlier{many} left out (frame{many} {frames}{' …' if outliers > 8 else ''})"
+            f"{outliers.size} outlier{many} left out (frame{many} {frames}{' …' if outliers.size > 8 else ''})"
         )
     scale = motion.chi_square / max(motion.freedom, 1)
     if scale > 1.0 + 3.0 * np.sqrt(2.0 / max(motion.freedom, 1)):
@@ -94,69 +80,75 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
         warnings.append(
             f"neighbouring frames err alike: uncertainties of all figures were raised {np.sqrt(alike):.1f} times"
         )
-    motion = replace(motion, covariance=motion.covariance * max(1.0, scale) * alike)
-    if not motion.ends or not np.isfinite(motion.find_stop()):
-        warnings.append("the record ends before the projectile stops: depth and stopping time are unknown")
-    return _describe(motion, track, camera, trusted, use, start, error, depth, warnings)
+    return _describe(choice, max(1.0, scale) * alike, track, camera, trusted, use, error, depth, warnings)
 
 
 def _describe(
-    motion: Motion,
+    choice: Choice,
+    growth: float,
     track: Track,
     camera: Camera,
     trusted: np.ndarray,
     use: np.ndarray,
-    start: tuple[float, float],
     error: FloatArray,
     depth: FloatArray,
     warnings: list[str],
 ) -> DecelerationCurve:
     time = track.time[trusted]
+    motion = choice.best.motion
     lowered = _refit_with_surface(motion, camera, time[use], depth[use], error[use])
-
     shift = camera.surface_row_sigma * camera.pixel_size
-
     scale = camera.pixel_size_sigma / camera.pixel_size
 
     def measure(
-        quantity: Callable[[FloatArray], float], by_surface: float = 0.0, by_scale: float = 0.0
+        quantity: Callable[[Motion, FloatArray], float], by_surface: float = 0.0, by_scale: float = 0.0
     ) -> Measured:
-        """Value with the uncertainties of noise, surface and scale.
+        """Value with the uncertainties of noise, choice of model, surface and scale.
 
         ``by_surface`` stands in where the lowered surface gives no fit; ``by_scale`` is the power of the pixel size.
         """
-        value, sigma = motion.propagate(quantity)
+        value, sigma = choice.propagate(quantity, growth)
         change = by_surface
-        if lowered is not None and np.isfinite(quantity(lowered.parameters)):
-            change = quantity(lowered.parameters) - float(value)
+        if lowered is not None and np.isfinite(quantity(lowered, lowered.parameters)):
+            change = quantity(lowered, lowered.parameters) - quantity(motion, motion.parameters)
         by_pixel = by_scale * scale * float(value)
         return Measured(float(value), float(np.sqrt(sigma**2 + change**2 + by_pixel**2)))
 
-    contact = measure(lambda p: p[0], shift / motion.parameters[2])
-    speed = measure(lambda p: p[2], by_scale=1.0)
-    nan = Measured(float("nan"), float("nan"))
-    stopped = np.isfinite(motion.find_stop())
-    penetration = measure(lambda p: motion.find_depth(p), shift, 1.0) if stopped else nan
-    stopping = measure(lambda p: motion.find_stop(0.0, p), shift / motion.parameters[2]) if stopped else nan
-    early = measure(lambda p: motion.find_stop(0.02, p), shift / motion.parameters[2]) if stopped else nan
+    later = shift / motion.parameters[2]
+    contact = measure(lambda m, p: p[0], later)
+    speed = measure(lambda m, p: p[2], by_scale=1.0)
+    stopping = measure(lambda m, p: m.find_stop(0.0, p), later)
+    early = measure(lambda m, p: m.find_stop(0.02, p), later)
+    penetration = measure(lambda m, p: m.find_depth(p), shift, 1.0)
+    stopped = bool(np.isfinite(stopping.value) and np.isfinite(penetration.value))
+    if not stopped:
+        penetration = stopping = early = Measured(float("nan"), float("nan"))
+        warnings.append(
+            "no stop can be fitted although the record goes on: depth and stopping time are unknown"
+            if choice.goes_on
+            else "the record ends before the projectile stops: depth and stopping time are unknown"
+        )
     rebound = None
-    if motion.rebound and motion.ends and stopped:
-        rebound = measure(lambda p: -motion.evaluate(np.array([p[1]]), p)[1][0], by_scale=1.0)
+    if motion.ending == "rebound" and stopped:
+        rebound = measure(
+            lambda m, p: -m.evaluate(np.array([p[1]]), p)[1][0] if m.ending == "rebound" else np.nan, by_scale=1.0
+        )
         if rebound.value < 2 * rebound.sigma:
             rebound = None
 
-    t0 = motion.parameters[0]
+    t0 = contact.value
     end = time[use][-1]
     at = np.unique(np.concatenate([[t0], track.time[(track.time > t0) & (track.time <= end)]]))
     values, sigmas = [], []
     for k in range(3):
         # times counted from each parameter set's own contact, so that the errors are those of z(t - t0)
-        value, sigma = motion.propagate(lambda p, k=k: motion.evaluate(p[0] + (at - t0) + 1e-12, p)[k])
-        other = value
+        value, sigma = choice.propagate(lambda m, p, k=k: m.evaluate(p[0] + (at - t0) + 1e-12, p)[k], growth)
+        change = 0.0
         if lowered is not None:
-            other = lowered.evaluate(lowered.parameters[0] + (at - t0) + 1e-12)[k]
+            change = lowered.evaluate(lowered.parameters[0] + (at - t0) + 1e-12)[k]
+            change = change - motion.evaluate(motion.parameters[0] + (at - t0) + 1e-12)[k]
         values.append(value)
-        sigmas.append(np.sqrt(sigma**2 + (other - value) ** 2 + (scale * value) ** 2))
+        sigmas.append(np.sqrt(sigma**2 + change**2 + (scale * value) ** 2))
     gravity = fit_gravity(time[use], depth[use], error[use], t0, scale)
     if gravity is not None and abs(gravity.value - STANDARD_GRAVITY) > 3 * gravity.sigma:
         warnings.append(
@@ -204,4 +196,4 @@ def _refit_with_surface(
         return None
     shift = camera.surface_row_sigma * camera.pixel_size
     begin = (motion.parameters[0], motion.parameters[1])
-    return fit_motion(time, depth - shift, error, motion.degree, motion.rebound, begin, motion.ends)
+    return fit_motion(time, depth - shift, error, motion.degree, motion.ending, begin)

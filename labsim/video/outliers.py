@@ -1,34 +1,80 @@
-"""Frames of a track that do not belong to its motion, found before any motion is fitted."""
+"""Frames that do not belong to a fall: what the fitted motion cannot explain, judged anew after every fit.
+
+No frame is judged by its neighbours alone: a projectile that stops within a few frames looks like an outlier to any straight
+line or parabola through them. The running median only gives the first guess: it leaves rows that grow as they are, however
+hard they bend.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from ..records import FloatArray
+from .segments import Ending, Motion, fit_motion
+
+OUTLIER = 5.0  # standard deviations; a frame left out costs a fit OUTLIER² of χ²
+RANGE = 5  # frames of the running median
+GROSS = 8.0  # standard deviations off the running median for the first guess
+ROUNDS = 12
 
 
-def drop_isolated(time: FloatArray, row: FloatArray, sigma: FloatArray) -> np.ndarray:
-    """Frames that agree with their neighbours; the worst is dropped first, one at a time, at most a fifth of them."""
-    keep = np.ones(len(row), bool)
-    while np.sum(keep) > 12 and np.sum(~keep) <= 0.2 * len(row):
-        index = np.flatnonzero(keep)
-        deviation = _deviate_robustly(time[index], row[index])
-        noise = np.maximum(sigma[index], 1.4826 * np.median(np.abs(deviation)))
-        score = np.abs(deviation) / noise
-        worst = int(np.argmax(score))
-        if score[worst] < 8.0:
+def follow_median(row: FloatArray) -> FloatArray:
+    """Running median over RANGE frames: rows that only grow come back unchanged, up to two spikes in five frames do not."""
+    return np.asarray(median_filter(row, RANGE, mode="nearest"))
+
+
+def guess_spikes(row: FloatArray, sigma: FloatArray) -> np.ndarray:
+    """Frames far off the running median, farther than their neighbours: where the first fit begins without, (n,) bool."""
+    off = np.abs(row - follow_median(row)) / sigma
+    off[:2] = off[-2:] = 0.0
+    beside = np.maximum(np.append(off[1:], 0.0), np.insert(off[:-1], 0, 0.0))
+    return (off > GROSS) & (off >= beside)
+
+
+def judge_frames(motion: Motion, time: FloatArray, depth: FloatArray, error: FloatArray, used: np.ndarray) -> np.ndarray:
+    """Frames that the motion explains to OUTLIER standard deviations, (n,) bool.
+
+    A frame in the fit is judged by what the fit would say of it without it (its deleted residual), one outside by its
+    prediction; both hold the uncertainty of the motion there. Of those that go, only the worst within two frames goes at a
+    time: a spike bends the fit beside it.
+    """
+    slope = motion.differentiate(time)
+    known = np.einsum("ni,ij,nj->n", slope, motion.covariance, slope) / error**2
+    misfit = (depth - motion.evaluate(time)[0]) / error
+    spread = max(1.0, 1.4826 * float(np.median(np.abs(misfit[used]))))
+    free = np.where(used, np.clip(1.0 - known, 0.05, 1.0), 1.0 + known)
+    score = misfit**2 / (free * spread**2)
+    worst = _find_worst_near(np.where(used, score, 0.0))
+    return np.where(used, (score < OUTLIER**2) | (score < worst), score < OUTLIER**2)
+
+
+def _find_worst_near(score: FloatArray) -> FloatArray:
+    """Largest score within two frames on either side, (n,)."""
+    padded = np.pad(score, 2)
+    return np.max([padded[k : k + len(score)] for k in range(5)], axis=0)
+
+
+def fit_without_outliers(
+    time: FloatArray,
+    depth: FloatArray,
+    error: FloatArray,
+    degree: int,
+    ending: Ending,
+    start: tuple[float, float],
+    used: np.ndarray,
+) -> tuple[Motion, np.ndarray] | None:
+    """One model fitted, its outliers dropped and taken back until they stand still: (motion, frames used)."""
+    seen = []
+    for _ in range(ROUNDS):
+        motion = fit_motion(time[used], depth[used], error[used], degree, ending, start)
+        if motion is None:
+            return None
+        renewed = judge_frames(motion, time, depth, error, used)
+        if np.array_equal(renewed, used) or any(np.array_equal(renewed, old) for old in seen):
             break
-        keep[index[worst]] = False
-    return keep
-
-
-def _deviate_robustly(time: FloatArray, row: FloatArray) -> FloatArray:
-    """Each row minus the median of straight lines through seven pairs of its neighbours, which one spike cannot move."""
-    n = len(row)
-    guesses = np.full((7, n), np.nan)
-    for k, (first, second) in enumerate(((-1, 1), (-2, 2), (-2, -1), (1, 2), (-3, -2), (2, 3), (-3, 3))):
-        i = np.arange(max(0, -first), min(n, n - second))
-        i = i[(i + first >= 0) & (i + second < n)]
-        t1, t2, r1, r2 = time[i + first], time[i + second], row[i + first], row[i + second]
-        guesses[k, i] = r1 + (r2 - r1) * (time[i] - t1) / (t2 - t1)
-    return row - np.nanmedian(guesses, axis=0)
+        if np.sum(renewed) < max(8, 0.5 * len(time)):
+            return None
+        seen.append(used)
+        used, start = renewed, (motion.parameters[0], motion.parameters[1])
+    return motion, used

@@ -4,67 +4,71 @@ Depth z below the undisturbed surface, t0 the contact, te the end of the deceler
 
 - t < t0: z = v0 (t - t0) + g (t - t0)²/2, with g free;
 - t0 ≤ t ≤ te: acceleration Σ c_k P_k(2u - 1), Legendre polynomials up to the degree that the data ask for;
-- t > te: at rest (then v(te) = 0, which fixes c_0 = -v0/(te - t0)) or, with ``rebound``, a free speed and a constant
-  acceleration.
+- t > te: at rest (then v(te) = 0, which fixes c_0 = -v0/(te - t0)) or, after a "rebound", a free speed and a constant
+  acceleration. "ease" is a rest that is reached without a jump of the acceleration: Σ c_k = 0. "open": the record ends
+  before the projectile does.
 
 Position and speed are continuous, the acceleration may jump at t0 and te. For given t0 and te the model is linear in
-everything else, so only these two are searched for (variable projection: Golub & Pereyra 1973).
+everything else, so only these two are searched for (variable projection: Golub & Pereyra 1973, with the derivative of
+Kaufman 1975).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.optimize import least_squares
 
 from ..records import STANDARD_GRAVITY, FloatArray
 
 GRAVITY_PRIOR_SIGMA = 3.0  # m/s^2; only steadies v0 where few frames lie before the contact
 
+Ending = Literal["rest", "ease", "rebound", "open"]
+
 
 @dataclass(frozen=True)
 class Motion:
-    """One fitted motion. parameters = (t0, te, v0, g, c…, [rebound acceleration]) in SI; covariance alike."""
+    """One fitted motion. parameters = (t0, te, v0, g, c…, [rebound acceleration]) in SI; covariance alike.
+
+    At rest c_0 is not among them, at ease nor is the last c.
+    """
 
     degree: int
-    rebound: bool
-    ends: bool  # False where the record ends before the projectile stops
+    ending: Ending
     parameters: FloatArray
     covariance: FloatArray
     chi_square: float
     freedom: int
 
-    @property
-    def criterion(self) -> float:
-        """Akaike's criterion with the small-sample term, noise level unknown (up to a constant)."""
-        p = len(self.parameters) + 1
-        n = self.freedom + len(self.parameters)
-        if n <= p + 1:
-            return np.inf
-        return n * np.log(max(self.chi_square, 1e-300) / n) + 2 * p + 2 * p * (p + 1) / (n - p - 1)
-
     def evaluate(self, time: FloatArray, parameters: FloatArray | None = None) -> tuple[FloatArray, ...]:
         """Depth (m), speed (m/s) and acceleration (m/s²) at ``time`` (s, shape (n,))."""
         p = self.parameters if parameters is None else parameters
-        columns = _design(np.asarray(time, float), p[0], p[1], self.degree, self.rebound)
-        return tuple(np.tensordot(p[2:], c, axes=(0, 0)) for c in columns)
+        columns = _design(np.asarray(time, float), p[0], p[1], self.degree, self.ending)
+        return tuple(p[2:] @ c for c in columns)
 
     def find_stop(self, fraction: float = 0.0, parameters: FloatArray | None = None) -> float:
         """Time after contact (s) at which the speed first falls to ``fraction`` of the impact speed; NaN if never."""
         p = self.parameters if parameters is None else parameters
         span = p[1] - p[0]
-        if fraction == 0.0 and not self.rebound:
-            return span if self.ends else np.nan
-        s = np.linspace(0.0, 1.0, 2001)
+        if fraction == 0.0 and self.ending in ("rest", "ease"):
+            return float(span)
+        s = np.linspace(0.0, 1.0, 201)
         speed = self.evaluate(p[0] + s * span, p)[1] - fraction * p[2]
         below = np.flatnonzero(speed[1:] <= 0.0)
         if below.size == 0:  # a rebound that is as good as none ends without quite turning back
-            return span if self.ends and speed[-1] < 0.02 * p[2] else np.nan
+            return float(span) if self.ending != "open" and speed[-1] < 0.02 * p[2] else np.nan
         i = int(below[0])
-        step = speed[i] / (speed[i] - speed[i + 1]) if speed[i] != speed[i + 1] else 0.0
-        return float(span * (s[i] + step * (s[i + 1] - s[i])))
+        found = s[i] + (s[i + 1] - s[i]) * (
+            speed[i] / (speed[i] - speed[i + 1]) if speed[i] != speed[i + 1] else 0.0
+        )
+        for _ in range(2):  # Newton, never out of the step that holds the root
+            _, (pace,), (push,) = self.evaluate(np.array([p[0] + found * span]), p)
+            if push < 0:
+                found = float(np.clip(found - (pace - fraction * p[2]) / (push * span), s[i], s[i + 1]))
+        return float(span * found)
 
     def find_depth(self, parameters: FloatArray | None = None) -> float:
         """Depth (m) at the first stop."""
@@ -72,7 +76,15 @@ class Motion:
         stop = self.find_stop(0.0, p)
         return float(self.evaluate(np.array([p[0] + stop]), p)[0][0]) if np.isfinite(stop) else np.nan
 
-    def propagate(self, quantity) -> tuple[FloatArray, FloatArray]:  # type: ignore[no-untyped-def]
+    def differentiate(self, time: FloatArray) -> FloatArray:
+        """Derivatives of the depth at ``time`` by the parameters, (n, p)."""
+        p = self.parameters
+        ends = _differentiate_ends(time, p, self.degree, self.ending)
+        return np.column_stack([*ends, *_design(time, p[0], p[1], self.degree, self.ending, 1)[0]])
+
+    def propagate(
+        self, quantity: Callable[[FloatArray], FloatArray | float]
+    ) -> tuple[FloatArray, FloatArray]:
         """Value and standard uncertainty of ``quantity(parameters)`` by linear propagation of the covariance."""
         p = self.parameters
         value = np.asarray(quantity(p), float)
@@ -109,33 +121,77 @@ def _legendre_integrals(u: FloatArray, degree: int) -> tuple[FloatArray, FloatAr
 
 
 def _design(
-    t: FloatArray, t0: float, te: float, degree: int, rebound: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Derivatives of depth, speed and acceleration by (v0, g, c…, [rebound acceleration]): (p, n) each."""
+    t: FloatArray, t0: float, te: float, degree: int, ending: Ending, orders: int = 3
+) -> list[FloatArray]:
+    """Derivatives of depth, speed and acceleration (the first ``orders`` of them) by (v0, g, c…, …): (p, n) each."""
     span = te - t0
     before, after = t < t0, t > te
+    inside = np.flatnonzero(~before & ~after)
     s = np.where(before, t - t0, 0.0)
-    u = np.clip((t - t0) / span, 0.0, 1.0)
     e = np.where(after, t - te, 0.0)
-    p0, p1, p2 = _legendre_integrals(u, degree)
-    inside = ~before & ~after
-    z = [np.where(before, s, u * span + e), 0.5 * s**2]
-    v = [np.ones_like(t), s]
-    a = [np.zeros_like(t), np.where(before, 1.0, 0.0)]
-    for k in range(degree + 1):
-        end_speed = span if k == 0 else 0.0  # ∫ P_k over the whole span vanishes for k > 0
-        z.append(span**2 * p2[k] + end_speed * e)
-        v.append(span * p1[k])
-        a.append(np.where(inside, p0[k], 0.0))
-    if rebound:
-        z.append(0.5 * e**2)
-        v.append(e)
-        a.append(np.where(after, 1.0, 0.0))
-    else:  # v(te) = 0: c_0 = -v0/span
-        for rows in (z, v, a):
-            rows[0] = rows[0] - rows[2] / span
-            del rows[2]
-    return np.array(z), np.array(v), np.array(a)
+    p0, p1, p2 = _legendre_integrals((t[inside] - t0) / span, degree)
+    count = degree + 3 + (ending == "rebound")
+    z, v, a = (np.zeros((count, len(t))) for _ in range(3))
+    z[0], z[1] = np.where(before, s, np.clip(t - t0, 0.0, span) + e), 0.5 * s**2
+    v[0], v[1] = 1.0, s
+    a[1] = before
+    z[2 : degree + 3, inside] = span**2 * p2
+    v[2 : degree + 3, inside] = span * p1
+    a[2 : degree + 3, inside] = p0
+    # at te: ∫ P_0 = 1, ∫∫ P_0 = 1/2, ∫∫ P_1 = -1/6, all others vanish there
+    z[2, after] = 0.5 * span**2 + span * e[after]
+    v[2, after] = span
+    if degree > 0:
+        z[3, after] = -(span**2) / 6.0
+    if ending == "rebound":
+        z[-1], v[-1], a[-1] = 0.5 * e**2, e, after
+    columns = [z, v, a][:orders]
+    if ending == "ease":  # the last c is minus the sum of the others
+        for rows in columns:
+            rows[2:-1] -= rows[-1]
+        columns = [rows[:-1] for rows in columns]
+    if ending in ("rest", "ease"):  # v(te) = 0: c_0 = -v0/span
+        for rows in columns:
+            rows[0] -= rows[2] / span
+        columns = [np.delete(rows, 2, axis=0) for rows in columns]
+    return columns
+
+
+def _differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Ending) -> list[FloatArray]:
+    """Derivatives of the depth by t0 and te, (n,) each."""
+    slopes = []
+    for k in range(2):
+        step = np.zeros(2)
+        step[k] = 1e-4 * (p[1] - p[0])
+        up, down = p[:2] + step, p[:2] - step
+        z = [p[2:] @ _design(t, each[0], each[1], degree, ending, 1)[0] for each in (up, down)]
+        slopes.append((z[0] - z[1]) / (2 * step[k]))
+    return slopes
+
+
+class _FreeFall:
+    """Frames long before the contact, (n,) each, as three numbers that say the same about every parabola through them."""
+
+    def __init__(self, time: FloatArray, depth: FloatArray, sigma: FloatArray) -> None:
+        self.middle = float(np.mean(time))
+        s = time - self.middle
+        rows = np.column_stack([np.ones_like(s), s, 0.5 * s**2, depth]) / sigma[:, None]
+        scale = np.linalg.norm(rows, axis=0) + 1e-300
+        corner = np.linalg.qr(rows / scale, mode="r") * scale
+        self.rows, self.target = corner[:3, :3], corner[:3, 3]
+        self.left = float(corner[3, 3] ** 2)  # χ² of the best parabola
+
+    def design(self, t0: float, columns: int) -> FloatArray:
+        """Their part of the matrix, (3, columns): only v0 and g are in it."""
+        back = t0 - self.middle
+        part = np.zeros((3, columns))
+        part[:, 0] = self.rows @ [-back, 1.0, 0.0]
+        part[:, 1] = self.rows @ [0.5 * back**2, -back, 1.0]
+        return part
+
+    def differentiate(self, p: FloatArray) -> FloatArray:
+        """Derivative of their model by t0, (3,)."""
+        return np.asarray(self.rows @ [-p[2] + p[3] * (p[0] - self.middle), -p[3], 0.0])
 
 
 def fit_motion(
@@ -143,76 +199,87 @@ def fit_motion(
     depth: FloatArray,
     sigma: FloatArray,
     degree: int,
-    rebound: bool,
+    ending: Ending,
     start: tuple[float, float],
-    ends: bool = True,
 ) -> Motion | None:
     """Fit one model; ``start`` = (t0, te) to begin from. Returns None where it cannot be fitted.
 
-    time (s), depth and sigma (m): shape (n,). With ``ends`` False te is held at the last frame and the speed there is
-    free: the record ends before the projectile does.
+    time (s), depth and sigma (m): shape (n,). With an "open" end te is held at the last frame and the speed there is free.
     """
-    columns = 2 + (degree + 1) + (1 if rebound and ends else -1 if not rebound else 0)
-    model_rebound = rebound or not ends
-    if not ends:
-        columns = 2 + degree + 1
-    if len(time) < columns + 4:
+    opened = ending == "open"
+    columns = 2 + degree + 1 + {"rest": -1, "ease": -2, "rebound": 1, "open": 0}[ending]
+    if len(time) < columns + 4 or (ending == "ease" and degree < 1):
         return None
-    prior = np.zeros(columns)
-    prior[1] = 1.0 / GRAVITY_PRIOR_SIGMA
     spacing = float(np.median(np.diff(time)))
     duration = time[-1] - time[0]
+    reach = 3.0 * spacing + 0.15 * (start[1] - start[0])
+    low = np.array([start[0] - reach, start[0] + 2.0 * spacing])
+    high = np.array([start[0] + reach, time[-1] + (0.0 if ending == "rebound" else 0.5 * duration)])
+    early = time < low[0]
+    free = _FreeFall(time[early], depth[early], sigma[early]) if np.sum(early) > 4 else None
+    if free is not None:
+        time, depth, sigma = time[~early], depth[~early], sigma[~early]
+    steady = 1.0 / GRAVITY_PRIOR_SIGMA
+    target = np.concatenate(
+        [[STANDARD_GRAVITY * steady], depth / sigma, free.target if free is not None else []]
+    )
 
-    def solve(t0: float, te: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        z = _design(time, t0, te, degree, model_rebound)[0][:columns]
-        matrix = np.vstack([(z / sigma).T, prior])
-        target = np.append(depth / sigma, STANDARD_GRAVITY / GRAVITY_PRIOR_SIGMA)
+    def build(q: FloatArray) -> FloatArray:
+        prior = np.zeros((1, columns))
+        prior[0, 1] = steady
+        z = _design(time, q[0], q[1], degree, ending, 1)[0]
+        return np.vstack([prior, (z / sigma).T, *([free.design(q[0], columns)] if free is not None else [])])
+
+    def solve(q: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
+        matrix = build(q)
         scale = np.linalg.norm(matrix, axis=0) + 1e-300
-        linear = np.linalg.lstsq(matrix / scale, target, rcond=1e-12)[0] / scale
-        return matrix @ linear - target, linear, matrix
+        left, size, right = np.linalg.svd(matrix / scale, full_matrices=False)
+        inverse = np.where(size > 1e-11 * size[0], 1.0 / np.maximum(size, 1e-300), 0.0)
+        linear = right.T @ (inverse * (left.T @ target)) / scale
+        misfit = matrix @ linear - target
+        return float(misfit @ misfit), misfit, linear, matrix, left
 
-    last = time[-1]
+    def slope(q: FloatArray, linear: FloatArray) -> FloatArray:
+        p = np.concatenate([q, linear])
+        by_ends = _differentiate_ends(time, p, degree, ending)
+        parts = [np.zeros((1, 2)), np.column_stack(by_ends) / sigma[:, None]]
+        if free is not None:
+            parts.append(np.column_stack([free.differentiate(p), np.zeros(3)]))
+        return np.vstack(parts)[:, : 1 if opened else 2]
 
-    def residual(q: FloatArray) -> FloatArray:
-        return solve(q[0], q[1] if ends else last)[0]
-
-    low = [time[0] - 0.5 * duration, start[0] + 2.0 * spacing]
-    high = [start[1] - spacing, last + (0.0 if rebound else 0.5 * duration)]
-    first = np.clip(np.array(start), np.array(low) + 1e-9, np.array(high) - 1e-9)
-    count = 2 if ends else 1
+    q = np.array([start[0], time[-1] if opened else start[1]])
+    free_ends = 1 if opened else 2
+    q[:free_ends] = np.clip(q, low, high)[:free_ends]
     try:
-        found = least_squares(
-            residual,
-            first[:count],
-            bounds=(low[:count], high[:count]),
-            x_scale=spacing,
-            diff_step=1e-5,
-            max_nfev=60,
-            xtol=1e-11,
-            ftol=1e-10,
-        )
+        cost, misfit, linear, matrix, left = solve(q)
+        for _ in range(40):
+            jacobian = slope(q, linear)
+            jacobian = jacobian - left @ (left.T @ jacobian)
+            step = np.linalg.lstsq(jacobian * spacing, -misfit, rcond=1e-9)[0] * spacing
+            largest = np.max(np.abs(step))
+            step *= min(1.0, 0.3 * max(q[1] - q[0], spacing) / max(largest, 1e-300))
+            for _ in range(8):
+                trial = q.copy()
+                trial[:free_ends] = np.clip(q[:free_ends] + step, low[:free_ends], high[:free_ends])
+                if trial[1] > trial[0] + spacing:
+                    better = solve(trial)
+                    if better[0] < cost:
+                        break
+                step *= 0.4
+            else:
+                break
+            gain, moved = cost - better[0], np.max(np.abs(trial - q))
+            q, (cost, misfit, linear, matrix, left) = trial, better
+            if gain < 1e-6 * cost and gain < 1e-3 or moved < 1e-7 * spacing:
+                break
+        jacobian = np.column_stack([slope(q, linear), matrix])
     except (ValueError, np.linalg.LinAlgError):
         return None
-    t0, te = float(found.x[0]), float(found.x[1]) if ends else last
-    misfit, linear, matrix = solve(t0, te)
-    by_t0, by_te = np.zeros(len(matrix)), np.zeros(len(matrix))
-    step = 0.02 * spacing
-    z_of = lambda a, b: np.tensordot(linear, _design(time, a, b, degree, model_rebound)[0][:columns], 1)  # noqa: E731
-    by_t0[:-1] = (z_of(t0 + step, te) - z_of(t0 - step, te)) / (2 * step) / sigma
-    nonlinear = [by_t0]
-    if ends:
-        by_te[:-1] = (z_of(t0, te + step) - z_of(t0, te - step)) / (2 * step) / sigma
-        nonlinear.append(by_te)
-    jacobian = np.column_stack([*nonlinear, matrix])
     scale = np.linalg.norm(jacobian, axis=0) + 1e-300
-    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) / np.outer(scale, scale)
-    if not ends:
+    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) / scale / scale[:, None]
+    if opened:
         covariance = np.insert(np.insert(covariance, 1, 0.0, axis=0), 1, 0.0, axis=1)
-        if model_rebound:
-            linear = np.append(linear, 0.0)
-            covariance = np.pad(covariance, (0, 1))
-    parameters = np.concatenate([[t0, te], linear])
-    chi_square = float(np.sum(misfit[:-1] ** 2))
-    return Motion(
-        degree, model_rebound, ends, parameters, covariance, chi_square, len(time) - len(parameters)
-    )
+    count = len(time) + int(np.sum(early))
+    chi_square = cost - misfit[0] ** 2 + (free.left if free is not None else 0.0)
+    parameters = np.concatenate([q, linear])
+    return Motion(degree, ending, parameters, covariance, chi_square, count - len(parameters))
