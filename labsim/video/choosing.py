@@ -10,10 +10,10 @@ import numpy as np
 from ..errors import MeasurementError
 from ..records import FloatArray
 from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
-from .segments import Ending, Motion
+from .segments import HIGHEST_DEGREE, Ending, Motion
 
-HIGHEST_DEGREE = 7
 STRIDE = 4  # frames over which a speed is guessed
+EASE = 0.05  # odds of a push that has faded to nothing at the stop, before the rows are looked at: dust has strength
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
 NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
 
@@ -25,14 +25,11 @@ class Candidate:
     motion: Motion
     used: np.ndarray
     chi_square: float  # with OUTLIER² for each frame left out
-    freedom: int
 
     def judge(self, noise: float) -> float:
-        """Akaike's criterion with the small-sample term for a noise level of ``noise`` times the error bars, squared."""
-        n, p = len(self.used), len(self.motion.parameters)
-        if n <= p + 2:
-            return np.inf
-        return self.chi_square / noise + 2 * p + 2 * p * (p + 1) / (n - p - 1)
+        """Schwarz's criterion, -2 ln(evidence), for a noise level of ``noise`` times the error bars, squared."""
+        odds = 2.0 * np.log(1.0 / EASE) if self.motion.ending == "ease" else 0.0
+        return self.chi_square / noise + np.log(len(self.used)) * len(self.motion.parameters) + odds
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ def _guess_stop(time: FloatArray, depth: FloatArray, contact: int, t0: float) ->
 def choose_motion(
     time: FloatArray, depth: FloatArray, error: FloatArray, start: tuple[float, float]
 ) -> Choice | None:
-    """Every model that explains the rows, weighed by Akaike's criterion (Burnham & Anderson 2002); None if none does.
+    """Every model that explains the rows, weighed by Schwarz's criterion (Kass & Raftery 1995); None if none does.
 
     Rest and rebound of all degrees; if nothing stops, an open end. Every frame left out costs a model OUTLIER² of χ², so that
     models with different outliers can be compared.
@@ -135,7 +132,6 @@ def choose_motion(
                 lead = here
             if degree > lead.motion.degree + 2:
                 break
-    found = [candidate for candidate in found if np.isfinite(candidate.judge(1.0))]
     if not found:
         return None
     best = min(found, key=lambda candidate: candidate.judge(1.0))
@@ -150,7 +146,7 @@ def choose_motion(
 def _weigh_outliers(motion: Motion, used: np.ndarray) -> Candidate:
     spread = max(1.0, motion.chi_square / max(motion.freedom, 1))
     chi_square = motion.chi_square + OUTLIER**2 * spread * float(np.sum(~used))
-    return Candidate(motion, used, chi_square, motion.freedom)
+    return Candidate(motion, used, chi_square)
 
 
 def _is_sound(motion: Motion, time: FloatArray) -> bool:

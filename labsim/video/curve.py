@@ -139,16 +139,16 @@ def _describe(
     t0 = contact.value
     end = time[use][-1]
     at = np.unique(np.concatenate([[t0], track.time[(track.time > t0) & (track.time <= end)]]))
-    values, sigmas = [], []
-    for k in range(3):
-        # times counted from each parameter set's own contact, so that the errors are those of z(t - t0)
-        value, sigma = choice.propagate(lambda m, p, k=k: m.evaluate(p[0] + (at - t0) + 1e-12, p)[k], growth)
-        change = 0.0
-        if lowered is not None:
-            change = lowered.evaluate(lowered.parameters[0] + (at - t0) + 1e-12)[k]
-            change = change - motion.evaluate(motion.parameters[0] + (at - t0) + 1e-12)[k]
-        values.append(value)
-        sigmas.append(np.sqrt(sigma**2 + change**2 + (scale * value) ** 2))
+
+    def follow(m: Motion, p: FloatArray) -> FloatArray:
+        """Depth, speed, acceleration, (3, n), at times counted from the parameters' own contact: errors of z(t - t0)."""
+        return np.array(m.evaluate(p[0] + (at - t0) + 1e-12, p))
+
+    values, sigmas = choice.propagate(follow, growth)
+    change = np.zeros_like(values)
+    if lowered is not None:
+        change = follow(lowered, lowered.parameters) - follow(motion, motion.parameters)
+    sigmas = np.sqrt(sigmas**2 + change**2 + (scale * values) ** 2)
     gravity = fit_gravity(time[use], depth[use], error[use], t0, scale)
     if gravity is not None and abs(gravity.value - STANDARD_GRAVITY) > 3 * gravity.sigma:
         warnings.append(

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import Legendre, Polynomial
 
 from ..records import STANDARD_GRAVITY, FloatArray
 
@@ -80,7 +80,7 @@ class Motion:
         """Derivatives of the depth at ``time`` by the parameters, (n, p)."""
         p = self.parameters
         ends = _differentiate_ends(time, p, self.degree, self.ending)
-        return np.column_stack([*ends, *_design(time, p[0], p[1], self.degree, self.ending, 1)[0]])
+        return np.column_stack([ends, _design(time, p[0], p[1], self.degree, self.ending, 1)[0].T])
 
     def propagate(
         self, quantity: Callable[[FloatArray], FloatArray | float]
@@ -106,18 +106,24 @@ class Motion:
         return value, np.sqrt(np.maximum(variance, 0.0))
 
 
-def _legendre_integrals(u: FloatArray, degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """P_k(2u-1), its integral from 0 and the integral of that, each (degree + 1, n)."""
-    p = legendre.legvander(2.0 * u - 1.0, degree + 2).T
-    first = np.empty((degree + 2, len(u)))
-    second = np.empty((degree + 1, len(u)))
-    first[0], first[1] = u, u**2 - u  # ∫ P_k dx = (P_{k+1} - P_{k-1})/(2k + 1), and dx = 2 du
-    for k in range(2, degree + 2):
-        first[k] = (p[k + 1] - p[k - 1]) / (2 * (2 * k + 1))
-    second[0] = 0.5 * u**2
-    for k in range(1, degree + 1):
-        second[k] = (first[k + 1] - first[k - 1]) / (2 * (2 * k + 1))
-    return p[: degree + 1], first[: degree + 1], second
+def _tabulate_legendre(highest: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Powers of u in P_k(2u - 1), in its integral from 0 and in the integral of that: (highest + 1, highest + 3) each."""
+    tables = [np.zeros((highest + 1, highest + 3)) for _ in range(3)]
+    for k in range(highest + 1):
+        power = Legendre.basis(k, domain=(0.0, 1.0)).convert(kind=Polynomial)
+        for table, each in zip(tables, (power, power.integ(), power.integ(2)), strict=True):
+            table[k, : len(each.coef)] = each.coef
+    return tables[0], tables[1], tables[2]
+
+
+HIGHEST_DEGREE = 7
+_TABLES = _tabulate_legendre(HIGHEST_DEGREE)
+
+
+def _integrate_legendre(u: FloatArray, degree: int, orders: int) -> list[FloatArray]:
+    """Twofold integral of P_k(2u - 1) from 0, its integral and itself (the first ``orders`` of them), (degree + 1, n) each."""
+    powers = np.vander(u, degree + 3, increasing=True).T
+    return [table[: degree + 1, : degree + 3] @ powers for table in _TABLES[::-1][:orders]]
 
 
 def _design(
@@ -129,23 +135,27 @@ def _design(
     inside = np.flatnonzero(~before & ~after)
     s = np.where(before, t - t0, 0.0)
     e = np.where(after, t - te, 0.0)
-    p0, p1, p2 = _legendre_integrals((t[inside] - t0) / span, degree)
-    count = degree + 3 + (ending == "rebound")
-    z, v, a = (np.zeros((count, len(t))) for _ in range(3))
+    integrals = _integrate_legendre((t[inside] - t0) / span, degree, orders)
+    columns = [np.zeros((degree + 3 + (ending == "rebound"), len(t))) for _ in range(orders)]
+    z = columns[0]
     z[0], z[1] = np.where(before, s, np.clip(t - t0, 0.0, span) + e), 0.5 * s**2
-    v[0], v[1] = 1.0, s
-    a[1] = before
-    z[2 : degree + 3, inside] = span**2 * p2
-    v[2 : degree + 3, inside] = span * p1
-    a[2 : degree + 3, inside] = p0
     # at te: ∫ P_0 = 1, ∫∫ P_0 = 1/2, ∫∫ P_1 = -1/6, all others vanish there
     z[2, after] = 0.5 * span**2 + span * e[after]
-    v[2, after] = span
     if degree > 0:
         z[3, after] = -(span**2) / 6.0
     if ending == "rebound":
-        z[-1], v[-1], a[-1] = 0.5 * e**2, e, after
-    columns = [z, v, a][:orders]
+        z[-1] = 0.5 * e**2
+    if orders > 1:
+        v = columns[1]
+        v[0], v[1], v[2, after] = 1.0, s, span
+        if ending == "rebound":
+            v[-1] = e
+    if orders > 2:
+        columns[2][1] = before
+        if ending == "rebound":
+            columns[2][-1] = after
+    for k, rows in enumerate(columns):
+        rows[2 : degree + 3, inside] = span ** (2 - k) * integrals[k]
     if ending == "ease":  # the last c is minus the sum of the others
         for rows in columns:
             rows[2:-1] -= rows[-1]
@@ -153,19 +163,50 @@ def _design(
     if ending in ("rest", "ease"):  # v(te) = 0: c_0 = -v0/span
         for rows in columns:
             rows[0] -= rows[2] / span
-        columns = [np.delete(rows, 2, axis=0) for rows in columns]
+            rows[2:-1] = rows[3:]
+        columns = [rows[:-1] for rows in columns]
     return columns
 
 
-def _differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Ending) -> list[FloatArray]:
-    """Derivatives of the depth by t0 and te, (n,) each."""
-    slopes = []
-    for k in range(2):
-        step = np.zeros(2)
-        step[k] = 1e-4 * (p[1] - p[0])
-        up, down = p[:2] + step, p[:2] - step
-        z = [p[2:] @ _design(t, each[0], each[1], degree, ending, 1)[0] for each in (up, down)]
-        slopes.append((z[0] - z[1]) / (2 * step[k]))
+def _differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Ending) -> FloatArray:
+    """Derivatives of the depth by t0 and te, (n, 2)."""
+    t0, te, v0, g = p[:4]
+    span = te - t0
+    c, by_span = np.zeros(degree + 1), np.zeros(degree + 1)  # all coefficients; how they change with te - t0
+    if ending in ("rest", "ease"):
+        c[0], by_span[0] = -v0 / span, v0 / span**2
+        c[1 : 1 + len(p) - 4] = p[4:]
+        if ending == "ease":
+            c[degree] = -np.sum(c[:degree])
+            by_span[degree] = -by_span[0]
+    else:
+        c[:] = p[4 : 5 + degree]
+    before, after = t < t0, t > te
+    inside = np.flatnonzero(~before & ~after)
+    u = (t[inside] - t0) / span
+    twice, once = _integrate_legendre(u, degree, 2)
+    end = np.zeros(degree + 1)
+    end[0] = 0.5
+    if degree > 0:
+        end[1] = -1.0 / 6.0
+    e = t[after] - te
+    push = p[-1] if ending == "rebound" else 0.0
+    slopes = np.zeros((len(t), 2))
+    slopes[before, 0] = -v0 - g * (t[before] - t0)
+    for k, (grows, since) in enumerate(((-1.0, -1.0), (1.0, 0.0))):  # how te - t0 and t - t0 change
+        slopes[inside, k] = (
+            v0 * since
+            + 2 * span * grows * (c @ twice)
+            + span * (since - u * grows) * (c @ once)
+            + span**2 * grows * (by_span @ twice)
+        )
+        slopes[after, k] = (
+            v0 * grows
+            + 2 * span * grows * (c @ end)
+            + span**2 * grows * (by_span @ end)
+            + grows * (c[0] + span * by_span[0]) * e
+            - (k == 1) * (v0 + span * c[0] + push * e)
+        )
     return slopes
 
 
@@ -242,7 +283,7 @@ def fit_motion(
     def slope(q: FloatArray, linear: FloatArray) -> FloatArray:
         p = np.concatenate([q, linear])
         by_ends = _differentiate_ends(time, p, degree, ending)
-        parts = [np.zeros((1, 2)), np.column_stack(by_ends) / sigma[:, None]]
+        parts = [np.zeros((1, 2)), by_ends / sigma[:, None]]
         if free is not None:
             parts.append(np.column_stack([free.differentiate(p), np.zeros(3)]))
         return np.vstack(parts)[:, : 1 if opened else 2]
