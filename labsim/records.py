@@ -237,6 +237,8 @@ class DecelerationCurve:
     residual: FloatArray | None = None
     used: npt.NDArray[np.bool_] | None = None  # (m,) frames of the track that the fit stands on
     degree: int | None = None  # of the polynomial of the deceleration
+    # s, (m,) times of the track's frames as the fit took them: not the track's where frames were lost silently
+    clock: FloatArray | None = None
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import MeasurementError
 from ..records import Camera, DecelerationCurve, FloatArray, Measured, Track
-from .checks import fit_gravity, measure_alikeness
+from .checks import find_second_impact, fit_gravity, measure_alikeness
 from .choosing import Choice, choose_motion, guess_ends
+from .gaps import find_lost_frames
 from .outliers import follow_median
 from .segments import STANDARD_GRAVITY, Motion, fit_motion
 
@@ -59,6 +61,16 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
             "tip_row_px",
             "no motion of free flight and deceleration fits; look at the rows against the time",
         )
+    clock = track.time.copy()
+    gap = find_lost_frames(time[window], depth[window], error[window], start, choice)
+    if gap is not None:
+        place, lost, choice = gap
+        clock[trusted[place] :] += lost * spacing
+        time = clock[trusted]
+        warnings.append(
+            f"{lost} frame{'s are' if lost > 1 else ' is'} missing before frame {track.frame[trusted[place]]}, though the frame "
+            "numbers go on (rows before and after disagree with one clock): later times were moved"
+        )
     motion = choice.best.motion
     use = np.zeros(len(time), bool)
     use[window] = choice.best.used
@@ -80,7 +92,7 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
         warnings.append(
             f"neighbouring frames err alike: uncertainties of all figures were raised {np.sqrt(alike):.1f} times"
         )
-    return _describe(choice, max(1.0, scale) * alike, track, camera, trusted, use, error, depth, warnings)
+    return _describe(choice, max(1.0, scale) * alike, replace(track, time=clock), camera, trusted, use, error, depth, warnings)
 
 
 def _describe(
@@ -128,6 +140,10 @@ def _describe(
             if choice.goes_on
             else "the record ends before the projectile stops: depth and stopping time are unknown"
         )
+    elif again := find_second_impact(
+        track.frame[trusted], depth, error, time > contact.value + stopping.value, penetration.value
+    ):
+        warnings.append(again)
     rebound = None
     if motion.ending == "rebound" and stopped:
         rebound = measure(
@@ -185,6 +201,7 @@ def _describe(
         residual=residual,
         used=used,
         degree=motion.degree,
+        clock=track.time,
     )
 
 

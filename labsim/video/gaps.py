@@ -1,14 +1,20 @@
-"""Frames that are missing, or there twice, in a file that has neither numbers nor stamps: seen by the motion itself."""
+"""Frames that are missing, or there twice, though numbers or stamps do not say so: seen by the motion itself."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..records import FloatArray
+from .choosing import Choice, choose_motion
+from .outliers import OUTLIER, guess_spikes
+from .segments import fit_motion
 
 BESIDE = 3  # steps on either side that say how far the projectile goes in one frame
 LEAST_STEP = 17.0  # error bars per frame: below, a missing frame cannot be told from noise
 MOST_MISSING = 8
+LONGEST_GUESS = 3  # frames lost at once that a track is searched for
+MOST_PLACES = 80  # places tried
+RUN = 3  # outliers side by side that make one ask for the clock
 
 
 def find_gaps(
@@ -42,3 +48,44 @@ def find_gaps(
             continue
         found.append((int(at[k + 1]), whole))
     return found
+
+
+def find_lost_frames(
+    time: FloatArray, depth: FloatArray, error: FloatArray, start: tuple[float, float], choice: Choice
+) -> tuple[int, int, Choice] | None:
+    """(index of the first frame after a gap that the clock hides, frames lost there, the motion with the clock put right).
+
+    time (s), depth, error (m): (n,) as they were fitted from ``start`` to ``choice``. Asked where RUN outliers lie side by side
+    or the rows scatter more than they say: then every place about them is tried with one to LONGEST_GUESS frames more, and the
+    best is taken if the motion gains by it what an outlier costs and what so many trials bring by chance. None otherwise.
+    """
+    best = choice.best
+    out = np.flatnonzero(~best.used)
+    run = [i for i in out if all(k in out for k in range(i, i + RUN))]
+    scatter = best.motion.chi_square > best.motion.freedom + 3.0 * np.sqrt(2.0 * max(best.motion.freedom, 1))
+    if not run and not scatter:
+        return None
+    spacing = float(np.median(np.diff(time)))
+    within = np.flatnonzero((time > start[0] - 10 * spacing) & (time < start[1]))
+    first, last = (run[0], run[-1] + RUN) if run else (within[0], within[-1])
+    places = np.arange(max(first - 3, 3), min(last + 4, len(time) - 3))
+    if len(places) > MOST_PLACES:
+        places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))
+    keep = ~guess_spikes(depth, error)
+    found, least = None, np.inf
+    for place in places:
+        for lost in range(1, LONGEST_GUESS + 1):
+            late = lost * spacing
+            moved = time + late * (np.arange(len(time)) >= place)
+            begin = start[0] + late * (start[0] >= time[place]), start[1] + late * (start[1] >= time[place])
+            motion = fit_motion(moved[keep], depth[keep], error[keep], 4, "rest", begin)
+            if motion is not None and motion.chi_square < least:
+                found, least = (int(place), lost, moved, begin), motion.chi_square
+    if found is None:
+        return None
+    place, lost, moved, begin = found
+    better = choose_motion(moved, depth, error, begin)
+    chance = OUTLIER**2 + 2.0 * np.log(len(places) * LONGEST_GUESS)
+    if better is None or better.best.judge(1.0) > best.judge(1.0) - chance:
+        return None
+    return place, lost, better
