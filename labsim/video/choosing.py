@@ -12,6 +12,7 @@ from ..records import FloatArray
 from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
 from .segments import HIGHEST_DEGREE, Ending, Motion
 
+AFTER_END = 3  # frames used beyond the end of the deceleration
 STRIDE = 4  # frames over which a speed is guessed
 EASE = 0.05  # odds of a push that has faded to nothing at the stop, before the rows are looked at: dust has strength
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
@@ -118,9 +119,11 @@ def choose_motion(
                 starts = [(lead.motion.parameters[0], lead.motion.parameters[1])]
             here: Candidate | None = None
             for begin in starts:
-                for used in [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]:
+                for used in (
+                    [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]
+                ):
                     fitted = fit_without_outliers(time, depth, error, degree, ending, begin, used)
-                    if fitted is None or (stops and not _is_sound(fitted[0], time)):
+                    if fitted is None or (stops and not _is_sound(fitted[0], time[fitted[1]])):
                         continue
                     candidate = _weigh_outliers(*fitted)
                     if here is None or candidate.judge(1.0) < here.judge(1.0):
@@ -132,6 +135,9 @@ def choose_motion(
                 lead = here
             if degree > lead.motion.degree + 2:
                 break
+    # fewer than AFTER_END frames beyond the end of the deceleration show neither rest nor rebound: one spike can make them
+    seen = [c for c in found if not stops or np.sum(time[c.used] > c.motion.parameters[1]) >= AFTER_END]
+    found = seen or found
     if not found:
         return None
     best = min(found, key=lambda candidate: candidate.judge(1.0))
@@ -140,7 +146,11 @@ def choose_motion(
     criteria = np.array([candidate.judge(noise) for candidate in found])
     weights = np.exp(-0.5 * (criteria - criteria[0]))
     kept = weights > LEAST_WEIGHT
-    return Choice(tuple(each for each, keep in zip(found, kept, strict=True) if keep), weights[kept] / weights[kept].sum(), stops)
+    return Choice(
+        tuple(each for each, keep in zip(found, kept, strict=True) if keep),
+        weights[kept] / weights[kept].sum(),
+        stops,
+    )
 
 
 def _weigh_outliers(motion: Motion, used: np.ndarray) -> Candidate:
@@ -150,7 +160,10 @@ def _weigh_outliers(motion: Motion, used: np.ndarray) -> Candidate:
 
 
 def _is_sound(motion: Motion, time: FloatArray) -> bool:
-    """Whether a fitted motion is one of a projectile: stops inside the record, and does not turn back before its rest."""
+    """Whether a fitted motion is one of a projectile: stops inside the record, and does not turn back before its rest.
+
+    At least one frame lies beyond the end of the deceleration.
+    """
     stop = motion.find_stop()
     t0, te, v0 = motion.parameters[:3]
     if (

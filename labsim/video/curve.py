@@ -16,6 +16,7 @@ from .outliers import follow_median
 from .segments import STANDARD_GRAVITY, Motion, fit_motion
 
 AFTER_STOP = 0.5  # share of the stopping time that is fitted beyond the stop
+LEAST_AFTER = 12.5  # frames that are, at least: dust that springs back pushes for some frames more
 
 
 def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") -> DecelerationCurve:
@@ -53,7 +54,7 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
             "fewer than three frames before contact: impact speed and contact time lean on the deceleration"
         )
     # what follows the first stop for long (a second landing, creep) is not part of the model
-    window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), 6.5 * spacing)
+    window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), LEAST_AFTER * spacing)
     choice = choose_motion(time[window], depth[window], error[window], start)
     if choice is None:
         raise MeasurementError(
@@ -92,7 +93,17 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
         warnings.append(
             f"neighbouring frames err alike: uncertainties of all figures were raised {np.sqrt(alike):.1f} times"
         )
-    return _describe(choice, max(1.0, scale) * alike, replace(track, time=clock), camera, trusted, use, error, depth, warnings)
+    return _describe(
+        choice,
+        max(1.0, scale) * alike,
+        replace(track, time=clock),
+        camera,
+        trusted,
+        use,
+        error,
+        depth,
+        warnings,
+    )
 
 
 def _describe(
@@ -147,7 +158,8 @@ def _describe(
     rebound = None
     if motion.ending == "rebound" and stopped:
         rebound = measure(
-            lambda m, p: -m.evaluate(np.array([p[1]]), p)[1][0] if m.ending == "rebound" else np.nan, by_scale=1.0
+            lambda m, p: -m.evaluate(np.array([p[1]]), p)[1][0] if m.ending == "rebound" else np.nan,
+            by_scale=1.0,
         )
         if rebound.value < 2 * rebound.sigma:
             rebound = None

@@ -32,7 +32,9 @@ def guess_spikes(row: FloatArray, sigma: FloatArray) -> np.ndarray:
     return (off > GROSS) & (off >= beside)
 
 
-def judge_frames(motion: Motion, time: FloatArray, depth: FloatArray, error: FloatArray, used: np.ndarray) -> np.ndarray:
+def judge_frames(
+    motion: Motion, time: FloatArray, depth: FloatArray, error: FloatArray, used: np.ndarray
+) -> np.ndarray:
     """Frames that the motion explains to OUTLIER standard deviations, (n,) bool.
 
     A frame in the fit is judged by what the fit would say of it without it (its deleted residual), one outside by its

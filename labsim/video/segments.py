@@ -311,7 +311,7 @@ def fit_motion(
                 break
             gain, moved = cost - better[0], np.max(np.abs(trial - q))
             q, (cost, misfit, linear, matrix, left) = trial, better
-            if gain < 1e-6 * cost and gain < 1e-3 or moved < 1e-7 * spacing:
+            if (gain < 1e-6 * cost and gain < 1e-3) or moved < 1e-7 * spacing:
                 break
         jacobian = np.column_stack([slope(q, linear), matrix])
     except (ValueError, np.linalg.LinAlgError):

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import MeasurementError
-from ..records import Camera, DecelerationCurve, Track
+from ..records import Camera, DecelerationCurve, FloatArray, Track
 from ..tracks import TrackRows, read_rows
 
 
@@ -87,28 +87,19 @@ def write_curve(curve: DecelerationCurve, path: Path | str) -> Path:
     return path
 
 
-def measure_scatter(time: np.ndarray, row: np.ndarray) -> float:
-    """Robust scatter (px, one position) about the parabola through each point's four neighbours; NaN below 8 points."""
-    deviation, factor = deviate_from_neighbours(time, row)
-    if len(deviation) == 0:
-        return float("nan")
-    scaled = deviation / factor
-    return float(1.4826 * np.median(np.abs(scaled)))
+def measure_scatter(time: FloatArray, row: FloatArray) -> float:
+    """Robust scatter (px, one position) about the parabola through each point's four neighbours; NaN below 8 points.
 
-
-def deviate_from_neighbours(time: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each position minus the parabola through two neighbours on either side, and the noise gain of that difference.
-
-    Returns (n,) px and (n,) -, both empty below 8 points. The first and last two points use the nearest four.
+    The first and last two points use the nearest four. A median: neither spikes nor the few frames of a hard stop move it.
     """
     n = len(row)
     if n < 8:
-        return np.empty(0), np.empty(0)
-    here = np.arange(n)
-    window = np.clip(here - 2, 0, n - 5)[:, None] + np.arange(5)
-    near = window[window != here[:, None]].reshape(n, 4)
+        return float("nan")
+    first = np.clip(np.arange(n) - 2, 0, n - 5)
+    near = first[:, None] + np.arange(5)
+    near = near[near != np.arange(n)[:, None]].reshape(n, 4)
     x = time[near] - time[:, None]
     x /= np.abs(x).max(axis=1, keepdims=True)
-    weights = np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=2))[:, 0]  # (n, 4)
-    deviation = row - np.einsum("nk,nk->n", weights, row[near])
-    return deviation, np.sqrt(1.0 + np.sum(weights**2, axis=1))
+    weights = np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=2))[:, 0]
+    deviation = row - np.sum(weights * row[near], axis=1)
+    return float(1.4826 * np.median(np.abs(deviation) / np.sqrt(1.0 + np.sum(weights**2, axis=1))))
