@@ -76,7 +76,10 @@ def shape_motion(law: str, rng: np.random.Generator, shapes: list) -> tuple[np.n
         if law == "linear":
             return [v, -(1.0 + slope * (1.0 - 2.0 * t))]
         if law == "sine":
-            return [v, -0.5 * np.pi * np.sin(np.pi * t)]  # half a sine: nothing at contact, nothing at the stop
+            return [
+                v,
+                -0.5 * np.pi * np.sin(np.pi * t),
+            ]  # half a sine: nothing at contact, nothing at the stop
         if law == "depth":
             return [v, -z]
         reach = min(max(z / radius, 0.0), 1.0)
@@ -121,9 +124,7 @@ def make_fall(rng: np.random.Generator, shapes: list) -> Fall:
     where = rng.choice(len(t), spikes, replace=False)
     row[where] += rng.choice([-1, 1], spikes) * np.exp(rng.uniform(np.log(0.2), np.log(30.0), spikes))
     n = len(t)
-    track = Track(
-        np.arange(n), np.arange(n) / RATE, row, np.full(n, sigma), np.ones(n, bool), ("",) * n
-    )
+    track = Track(np.arange(n), np.arange(n) / RATE, row, np.full(n, sigma), np.ones(n, bool), ("",) * n)
     return Fall(law, speed, stop, sigma, spikes, rebound, track, depth)
 
 

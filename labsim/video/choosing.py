@@ -13,7 +13,7 @@ from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
 from .segments import HIGHEST_DEGREE, Ending, Motion
 
 AFTER_END = 3  # frames used beyond the end of the deceleration
-STRIDE = 4  # frames over which a speed is guessed
+LEAST_STRIDE = 4  # frames over which a speed is guessed
 EASE = 0.05  # odds of a push that has faded to nothing at the stop, before the rows are looked at: dust has strength
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
 NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
@@ -87,10 +87,20 @@ def guess_ends(time: FloatArray, depth: FloatArray, name: object) -> tuple[float
 def _guess_stop(time: FloatArray, depth: FloatArray, contact: int, t0: float) -> float:
     """First time after contact at which the projectile goes on by less than 3 % of its free fall, or than noise hides."""
     spacing = float(np.median(np.diff(time)))
-    pace = (depth[STRIDE:] - depth[:-STRIDE]) / (time[STRIDE:] - time[:-STRIDE])
     noise = 1.4826 * float(np.median(np.abs(np.diff(depth, 3)))) / np.sqrt(20.0)
-    fast = float(np.median(pace[max(contact - 10, 0) : max(contact - STRIDE, 1)]))
-    slow = max(0.03 * fast, 2.0 * noise / (STRIDE * spacing))
+    fall = slice(max(contact - 50, 0), max(contact, 3))
+    fast = (
+        float(np.median(np.diff(depth[fall])) / spacing)
+        if contact < 8
+        else float(np.polyfit(time[fall], depth[fall], 1)[0])
+    )
+    stride = int(
+        np.clip(
+            30.0 * noise / max(fast * spacing, 1e-300), LEAST_STRIDE, max(len(time) // 40, 2 * LEAST_STRIDE)
+        )
+    )
+    pace = (depth[stride:] - depth[:-stride]) / (time[stride:] - time[:-stride])
+    slow = max(0.03 * fast, 2.0 * noise / (stride * spacing))
     still = pace < slow
     rests = np.flatnonzero(still[contact:] & np.append(still[contact + 1 :], True))
     if rests.size == 0:
@@ -119,15 +129,15 @@ def choose_motion(
                 starts = [(lead.motion.parameters[0], lead.motion.parameters[1])]
             here: Candidate | None = None
             for begin in starts:
-                for used in (
-                    [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]
-                ):
-                    fitted = fit_without_outliers(time, depth, error, degree, ending, begin, used)
-                    if fitted is None or (stops and not _is_sound(fitted[0], time[fitted[1]])):
-                        continue
-                    candidate = _weigh_outliers(*fitted)
-                    if here is None or candidate.judge(1.0) < here.judge(1.0):
-                        here = candidate
+                used = first if lead is None else lead.used
+                fitted = fit_without_outliers(time, depth, error, degree, ending, begin, used)
+                if fitted is None or (stops and not _is_sound(fitted[0], time[fitted[1]])):
+                    continue
+                candidate = _weigh_outliers(*fitted)
+                if here is None or candidate.judge(1.0) < here.judge(1.0):
+                    here = candidate
+                if candidate.motion.chi_square < 2.0 * candidate.motion.freedom:
+                    break
             if here is None:
                 continue
             found.append(here)

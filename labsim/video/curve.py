@@ -16,6 +16,7 @@ from .outliers import follow_median
 from .segments import STANDARD_GRAVITY, Motion, fit_motion
 
 AFTER_STOP = 0.5  # share of the stopping time that is fitted beyond the stop
+WIDENINGS = 4  # times that the end of what is fitted is moved on where the stop lies beyond the first guess
 LEAST_AFTER = 12.5  # frames that are, at least: dust that springs back pushes for some frames more
 
 
@@ -54,8 +55,14 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
             "fewer than three frames before contact: impact speed and contact time lean on the deceleration"
         )
     # what follows the first stop for long (a second landing, creep) is not part of the model
-    window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), LEAST_AFTER * spacing)
-    choice = choose_motion(time[window], depth[window], error[window], start)
+    for _ in range(WIDENINGS):
+        window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), LEAST_AFTER * spacing)
+        choice = choose_motion(time[window], depth[window], error[window], start)
+        end = choice.best.motion.parameters[1] if choice is not None and choice.goes_on else start[1]
+        enough = choice is not None and end + 0.2 * (end - start[0]) < time[window][-1]
+        if window.all() or enough:
+            break
+        start = start[0], max(end, start[0] + 1.4 * (start[1] - start[0]))
     if choice is None:
         raise MeasurementError(
             name,
