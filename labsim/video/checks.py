@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..records import DecelerationCurve, FloatArray, Measured
+from ..records import STANDARD_GRAVITY, DecelerationCurve, FloatArray, Measured
 from .outliers import follow_median
-from .segments import STANDARD_GRAVITY
 
 MOST_LAGS = 12
 MOST_ALIKE = 0.95

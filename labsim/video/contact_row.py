@@ -19,9 +19,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..errors import MeasurementError
-from ..records import Camera, FloatArray, Measured, Track
+from ..records import STANDARD_GRAVITY, Camera, FloatArray, Measured, Track
 from .curve import fit_deceleration
-from .segments import STANDARD_GRAVITY
 
 LAWS = (  # whether the force grows with the tip's area, powers of the speed in it
     (True, (0, 2)),

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import MeasurementError
-from ..records import Camera, DecelerationCurve, FloatArray, Measured, Track
+from ..records import STANDARD_GRAVITY, Camera, DecelerationCurve, FloatArray, Measured, Track
 from .checks import find_second_impact, fit_gravity, measure_alikeness
 from .choosing import Choice, choose_motion, guess_ends
 from .gaps import find_lost_frames
 from .outliers import follow_median
-from .segments import STANDARD_GRAVITY, Motion, fit_motion
+from .segments import Motion, fit_motion
 
 AFTER_STOP = 0.5  # share of the stopping time that is fitted beyond the stop
 WIDENINGS = 4  # times that the end of what is fitted is moved on where the stop lies beyond the first guess
