@@ -34,6 +34,7 @@ from .records import (
     Record,
     Scan,
 )
+from .repeated_records import refuse_repeated_files
 from .tables import Document, Table
 from .tracks import read_rows
 
@@ -65,7 +66,9 @@ def read_campaign(folder: Path | str) -> Campaign:
     if not drops:
         raise CampaignError(folder / "drops", "", "holds no drop; add drops/D01/drop.toml")
     read_scans = [read_scan(path) for path in list_parts(folder / "ct", "scan.toml")]
+    scans = tuple(scan for scan in read_scans if isinstance(scan, Scan))
     _check_sequence(folder, drops)
+    refuse_repeated_files(folder, drops, scans)
     for wanted in planar.calibration_drops:
         if wanted not in {drop.name for drop in drops}:
             raise CampaignError(
@@ -83,7 +86,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         gravity=gravity,
         geometry=geometry,  # type: ignore[arg-type]
         drops=drops,
-        scans=tuple(scan for scan in read_scans if isinstance(scan, Scan)),
+        scans=scans,
         published_scans=tuple(scan for scan in read_scans if isinstance(scan, PublishedScan)),
         planar=planar,
         source=source,
@@ -140,7 +143,7 @@ def read_drop(path: Path | str) -> Drop:
 
 
 def describe_campaign(campaign: Campaign) -> dict[str, Any]:
-    """What ``labsim check`` says: counts, and ``text`` for people."""
+    """What a campaign holds, as its files state it: counts, and ``text`` for people."""
     kinds: dict[str, int] = {}
     for drop in campaign.drops:
         kinds[drop.record.kind] = kinds.get(drop.record.kind, 0) + 1
@@ -162,7 +165,6 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         lines.append(
             f"  {len(assumed)} drops rest on assumed figures; each drop.toml says which and why under [source]"
         )
-    lines.append("nothing is wrong with its files")
     return {
         "campaign": campaign.name,
         "drops": len(campaign.drops),

@@ -1,0 +1,72 @@
+"""What ``labsim check`` sees beyond the form of the files: what the data themselves say, and what they contradict.
+
+Every track is fitted, every video is decoded, every scan is reduced; nothing is simulated. ``inspect_campaign`` gives what
+is there, what cannot be read, what looks odd and what is missing; the questions are asked in one file each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..errors import CampaignError, LabsimError
+from ..records import Campaign, Drop, Track
+from ..repeated_records import refuse_repeated_rows
+from .drops import inspect_drop
+from .found import Found
+from .missing import list_missing
+from .scales import judge_scales
+from .scans import inspect_scan
+
+Progress = Callable[[float, float, str], None]
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """drops, scans : one Found each; odd, missing : lines of the campaign as a whole."""
+
+    drops: list[Found]
+    scans: list[Found]
+    odd: list[str]
+    missing: list[str]
+
+    @property
+    def troubles(self) -> dict[str, LabsimError]:
+        """Why a drop or scan cannot be read, by its name."""
+        return {
+            found.name: found.trouble for found in (*self.drops, *self.scans) if found.trouble is not None
+        }
+
+    @property
+    def all_odd(self) -> list[str]:
+        """What looks odd, of the campaign first, then of each drop and scan with its name."""
+        return self.odd + [
+            f"{found.name}: {text}" for found in (*self.drops, *self.scans) for text in found.odd
+        ]
+
+
+def inspect_campaign(campaign: Campaign, progress: Progress) -> Inspection:
+    """Read and judge everything in a campaign; what cannot be read does not stop the rest."""
+    total = len(campaign.drops) + len(campaign.scans)
+    drops, scans = [], []
+    for drop in campaign.drops:
+        drops.append(inspect_drop(drop, campaign))
+        progress(len(drops), total, "reading drops and scans")
+    for scan in campaign.scans:
+        scans.append(inspect_scan(scan, campaign))
+        progress(len(drops) + len(scans), total, "reading drops and scans")
+    _find_repeated(campaign, drops)
+    return Inspection(drops, scans, judge_scales(drops), list_missing(campaign))
+
+
+def _find_repeated(campaign: Campaign, found: list[Found]) -> None:
+    """Drops whose rows are those of an earlier one cannot stand beside it."""
+    kept: list[tuple[Drop, Track]] = []
+    for drop, each in zip(campaign.drops, found, strict=True):
+        if each.track is None:
+            continue
+        try:
+            refuse_repeated_rows([*kept, (drop, each.track)])
+            kept.append((drop, each.track))
+        except CampaignError as trouble:
+            each.trouble = trouble

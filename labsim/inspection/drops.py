@@ -1,0 +1,107 @@
+"""One drop: its track fitted or its video decoded, and what that says of the drop."""
+
+from __future__ import annotations
+
+import math
+
+from ..errors import LabsimError
+from ..inference.observe import read_observed_track
+from ..records import STANDARD_GRAVITY, Campaign, DecelerationCurve, Drop, Measured, Track
+from ..video import open_frames
+from ..video.curve import fit_deceleration
+from .found import Found, is_odd
+from .frames import count_missing, judge_frames
+from .scales import TOO_FAST
+
+LEAST_FRAMES = 5  # of free fall above the surface
+LOST_SHARE = 0.2  # of the frames
+NARROW = 6.0  # container over tip diameter below which walls are felt
+SAID_HERE = ("left out (frame", "no position")  # warnings of the curve that judge_frames says in other words
+
+
+def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
+    projectile = drop.projectile
+    size = f"{2e3 * projectile.tip_radius:.3g} mm {projectile.tip}, {projectile.mass * 1e6:.3g} mg"
+    if drop.record.kind == "summary":
+        return Found(drop.name, f"{size}: published figures")
+    if drop.record.kind == "video":
+        return _inspect_video(drop, size)
+    assert drop.camera is not None and drop.record.path is not None
+    try:
+        track = read_observed_track(drop)
+        curve = fit_deceleration(track, drop.camera, name=drop.record.path)
+    except LabsimError as trouble:
+        return Found(drop.name, f"{size}: no motion can be fitted", trouble=trouble)
+    found = _describe(drop, size, track, curve)
+    found.odd += [text for text in curve.warnings if not any(words in text for words in SAID_HERE)]
+    found.odd += judge_frames(track, curve, drop.camera)
+    _judge_fall(drop, track, curve, found)
+    if curve.penetration_depth.value > 0.5 * campaign.sample.depth:
+        found.odd.append(
+            f"comes to {curve.penetration_depth.value * 1e3:.2g} mm, more than half of the dust's depth: the floor is felt"
+        )
+    if campaign.sample.diameter < NARROW * 2 * projectile.tip_radius:
+        found.odd.append(
+            f"the container is only {campaign.sample.diameter / 2 / projectile.tip_radius:.2g} tips wide: walls are felt"
+        )
+    return found
+
+
+def _inspect_video(drop: Drop, size: str) -> Found:
+    """Every picture is decoded; what is in them is the business of ``labsim track``."""
+    assert drop.record.path is not None
+    try:
+        frames = open_frames(drop.record.path)
+        for _ in frames:
+            pass
+    except LabsimError as trouble:
+        return Found(drop.name, f"{size}: the video cannot be read", trouble=trouble)
+    line = f"{size}: video of {len(frames)} frames, not tracked yet (labsim track)"
+    return Found(
+        drop.name, line, {"frames": len(frames)}, [text for text in frames.warnings if "truncated" in text]
+    )
+
+
+def _describe(drop: Drop, size: str, track: Track, curve: DecelerationCurve) -> Found:
+    frames, lost = int(track.valid.sum()), count_missing(track)
+    depth, stop, speed = curve.penetration_depth, curve.stopping_time, curve.impact_speed
+    found = Found(
+        drop.name,
+        f"{size}: {frames} frames, {speed.value:.3f} m/s at contact, "
+        + (f"{depth.value * 1e3:.3f} mm deep after {stop.value * 1e3:.2f} ms" if math.isfinite(depth.value) else "never stops"),
+        {
+            "frames": frames,
+            "frames_missing": lost,
+            "impact_speed_m_s": speed.value,
+            "penetration_depth_m": depth.value,
+            "stopping_time_s": stop.value,
+        },
+        track=track,
+    )  # fmt: skip
+    if lost > LOST_SHARE * (frames + lost):
+        found.odd.append(f"{lost} of {frames + lost} frames have no position")
+    return found
+
+
+def _judge_fall(drop: Drop, track: Track, curve: DecelerationCurve, found: Found) -> None:
+    """Free fall above the surface: enough frames, and gravity and speed as they should be."""
+    free = int((track.time[track.valid] < curve.contact_time.value).sum())
+    if free < LEAST_FRAMES:
+        found.odd.append(
+            f"only {free} frames before contact; the speed at contact needs free fall above the surface"
+        )
+    if (g := curve.apparent_gravity) is not None:
+        found.numbers["apparent_gravity_m_s2"] = g.value
+        found.gravity = Measured(g.value / STANDARD_GRAVITY, g.sigma / STANDARD_GRAVITY)
+    if drop.height is None or drop.height.value <= 0:
+        return
+    speed = curve.impact_speed
+    expected = math.sqrt(2 * STANDARD_GRAVITY * drop.height.value)
+    share = math.hypot(speed.sigma / expected, 0.5 * drop.height.sigma / drop.height.value)
+    found.speed = Measured(speed.value / expected, share)
+    found.numbers["speed_over_free_fall"] = speed.value / expected
+    if is_odd(found.speed):
+        found.odd.append(
+            f"{speed.value:.3f} m/s {TOO_FAST} {drop.height.value * 1e3:.3g} mm of free fall give {expected:.3f} ± "
+            f"{expected * 0.5 * drop.height.sigma / drop.height.value:.3f} m/s; check height_mm, pixel_size_um, frame_rate_Hz"
+        )

@@ -1,0 +1,46 @@
+"""What an inspection says of one drop or scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import LabsimError
+from ..records import Measured, Track
+
+ODD = 3.0  # standard deviations
+SMALL_SHARE = 0.01  # relative: what is smaller is not worth a word
+
+
+@dataclass
+class Found:
+    """One drop or scan: a line for people, numbers for --json, and what looks odd.
+
+    trouble : why it cannot be read at all. gravity, speed : over what they should be.
+    """
+
+    name: str
+    line: str
+    numbers: dict[str, Any] = field(default_factory=dict)
+    odd: list[str] = field(default_factory=list)
+    trouble: LabsimError | None = None
+    gravity: Measured | None = None
+    speed: Measured | None = None
+    track: Track | None = None
+
+
+def is_odd(ratio: Measured) -> bool:
+    """Whether a ratio that should be one is not."""
+    return abs(ratio.value - 1) > max(ODD * ratio.sigma, SMALL_SHARE)
+
+
+def list_numbers(numbers: list[int], most: int = 8) -> str:
+    """3, 7-12, 40 … for people."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][1] + 1:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number])
+    shown = ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in runs[:most])
+    return shown + (" …" if len(runs) > most else "")

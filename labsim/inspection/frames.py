@@ -1,0 +1,222 @@
+"""What the rows of one track contradict: frames that are missing, left out, repeated, or of another drop.
+
+Rows follow one motion: free fall, a deceleration, rest or a small rebound. They cannot jump (a projectile has no infinite
+speed), not agree to the last digit while it moves (noise does not repeat), and after the stop nothing pulls down faster
+than gravity. Nothing is simulated for this; the fitted contact and stop only say where the acceleration may change.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..inference.observe import deviate_robustly
+from ..records import STANDARD_GRAVITY, Camera, DecelerationCurve, FloatArray, Track
+from ..video.track_file import measure_scatter
+from .found import list_numbers
+
+CONSECUTIVE = 3  # frames in a row that are worth a word
+MANY_LEFT_OUT = 0.05  # of the fitted frames; honest tracks have one spike in a hundred frames
+SIDE = 8  # frames on either side of a jump that is tested
+CLEAR = 6.0  # standard deviations of a jump or a fall: hundreds of places are tried, 4 is the most in an honest track
+LEAST_JUMP = 0.5  # px
+STRAY = 6.0  # standard deviations from the neighbours
+PULL = (
+    1.5  # times gravity that nothing exceeds after the stop, pixel size and frame rate being somewhat wrong
+)
+
+
+def judge_frames(track: Track, curve: DecelerationCurve, camera: Camera) -> list[str]:
+    """What is odd in the frames of a track, one line each."""
+    good = track.valid & np.isfinite(track.tip_row)
+    frame, time, row = track.frame[good], track.time[good], track.tip_row[good]
+    noise = float(np.median(track.sigma[good]))
+    if np.isfinite(scatter := measure_scatter(time, row)):
+        noise = max(noise, scatter)  # whole pixels, say
+    repeats = _find_repeats(frame, row, noise)
+    said = _judge_gaps(frame, time, curve) + _judge_left_out(track, curve)
+    if repeats.size:
+        numbers = [int(number) for number in frame[repeats + 1]]
+        said.append(
+            f"frame{'s' * (len(numbers) > 1)} {list_numbers(numbers)} repeat{'s' * (len(numbers) == 1)} the row before to "
+            "the last digit while the projectile moves: pictures were doubled, and time is counted wrong from there"
+        )
+    keep = ~_find_spikes(time, row, noise)
+    frame, time, row = frame[keep], time[keep], row[keep]
+    fitted = time <= track.time[curve.used].max() if curve.used is not None else np.ones(time.size, bool)
+    doubled = track.frame[good][repeats]
+    said += _judge_jumps(frame[fitted], time[fitted], row[fitted], noise, curve, doubled)
+    return said + _judge_after_stop(frame, time, row, noise, curve, camera)
+
+
+def count_missing(track: Track) -> int:
+    """Frames between the first and the last that have no position."""
+    seen = track.frame[track.valid & np.isfinite(track.tip_row)]
+    return int(seen[-1] - seen[0] + 1 - seen.size) if seen.size else track.frame.size
+
+
+def _find_stop(curve: DecelerationCurve) -> float:
+    stop = curve.contact_time.value + curve.stopping_time.value
+    return stop if np.isfinite(stop) else np.inf
+
+
+def _judge_gaps(frame: np.ndarray, time: FloatArray, curve: DecelerationCurve) -> list[str]:
+    """Runs of frames without a position, up to the stop."""
+    said = []
+    contact = curve.contact_time.value
+    for k in np.flatnonzero(np.diff(frame) > CONSECUTIVE):
+        if time[k] >= _find_stop(curve):
+            continue
+        span = f"{int(np.diff(frame)[k] - 1)} frames ({frame[k] + 1}-{frame[k + 1] - 1})"
+        if time[k] < contact < time[k + 1]:
+            said.append(
+                f"{span} are missing about contact: contact and the first deceleration are bridged by the fit"
+            )
+        elif time[k] >= contact:
+            said.append(
+                f"{span} are missing while the projectile is stopped: depth and stopping time lean on the fit"
+            )
+        else:
+            said.append(f"{span} are missing in free fall")
+    return said
+
+
+def _judge_left_out(track: Track, curve: DecelerationCurve) -> list[str]:
+    """Frames with a position that the fit does not stand on."""
+    if curve.used is None or curve.residual is None:
+        return []
+    left_out = track.valid & ~curve.used & np.isfinite(curve.residual)
+    numbers = [int(number) for number in track.frame[left_out]]
+    at = np.flatnonzero(left_out[track.valid])
+    consecutive = max((run.size for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)), default=0)
+    fitted = int(curve.used.sum())
+    if consecutive < CONSECUTIVE and len(numbers) <= MANY_LEFT_OUT * fitted:
+        return []
+    many = f", {consecutive} of them in a row" if consecutive >= CONSECUTIVE else ""
+    return [
+        f"{len(numbers)} of {len(numbers) + fitted} frames are left out of the fit as outliers{many} "
+        f"(frames {list_numbers(numbers)}): look at these frames"
+    ]
+
+
+def _find_repeats(frame: np.ndarray, row: FloatArray, noise: float) -> np.ndarray:
+    """Places of rows that the next one repeats to the last digit while the projectile moves."""
+    step = np.abs(np.diff(row))
+    if step.size < 2 * SIDE:
+        return np.empty(0, int)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(step, SIDE, mode="edge"), 2 * SIDE + 1)
+    around = np.quantile(windows, 0.3, axis=1)  # a few repeats do not hide the motion
+    return np.flatnonzero((step == 0) & (np.diff(frame) == 1) & (around > max(CLEAR * noise, LEAST_JUMP)))
+
+
+def _find_spikes(time: FloatArray, row: FloatArray, noise: float) -> np.ndarray:
+    """Rows far from their neighbours, one alone or two to the same side; the two sides of a jump are no spikes."""
+    deviation = deviate_robustly(time, row, noise)
+    stray = np.abs(deviation) > STRAY * noise
+    places = np.flatnonzero(stray)
+    for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+        if run.size > 2 or (run.size == 2 and np.prod(deviation[run]) < 0):
+            stray[run] = False
+    return stray
+
+
+def _judge_jumps(
+    frame: np.ndarray,
+    time: FloatArray,
+    row: FloatArray,
+    noise: float,
+    curve: DecelerationCurve,
+    doubled: np.ndarray,
+) -> list[str]:
+    """Steps of the row that no smooth motion makes, the clearest of each place; not where frames are known to be ``doubled``."""
+    if row.size < 2 * SIDE + 4:
+        return []
+    tick = float(np.median(np.diff(time) / np.diff(frame)))
+    contact, stop = (
+        (instant - time[0]) / tick + frame[0] for instant in (curve.contact_time.value, _find_stop(curve))
+    )
+    jumps, clear = _measure_jumps(frame.astype(float), row, noise, contact, stop)
+    for number in doubled:
+        clear[np.abs(frame[:-1] - number) <= 2 * SIDE] = 0.0
+    said: list[str] = []
+    while clear.max() > CLEAR and len(said) < 3:
+        k = int(np.argmax(clear))
+        near = slice(max(k - SIDE, 0), k + SIDE)
+        step = float(np.median(np.diff(row)[near] / np.diff(frame)[near]))
+        count = abs(jumps[k]) / step if step > 0 else 0.0
+        why = "the camera or the projectile jumped"
+        if abs(count - round(count)) < 0.25 and 1 <= round(count) < 100:
+            lost = "lost" if jumps[k] > 0 else "doubled"
+            why = f"as if {round(count)} frame{'s were' if round(count) > 1 else ' was'} {lost}, or {why}"
+        said.append(
+            f"the row jumps by {jumps[k]:+.1f} px between frames {frame[k]} and {frame[k + 1]}: {why}"
+        )
+        clear[max(k - 2 * SIDE, 0) : k + 2 * SIDE + 1] = 0.0
+    return said
+
+
+def _measure_jumps(
+    frame: FloatArray, row: FloatArray, noise: float, contact: float, stop: float
+) -> tuple[FloatArray, FloatArray]:
+    """Height of a step after each row, (n - 1,) px, and how many standard deviations that is; 0 where nothing is tried.
+
+    SIDE rows on either side are fitted by one cubic, by a parabola and a cubic where contact lies between them, with a step.
+    """
+    jumps, clear = np.zeros(row.size - 1), np.zeros(row.size - 1)
+    for k in range(3, row.size - 4):
+        near = slice(max(k - SIDE + 1, 0), k + SIDE + 1)
+        x = (frame[near] - frame[k] - 0.5) / SIDE
+        columns = [np.ones_like(x), x, x**2, np.where(x > 0, 1.0, 0.0)]
+        at = (contact - frame[k] - 0.5) / SIDE
+        late = np.maximum(x - max(at, -2.0), 0.0)
+        if at < x[-1]:
+            columns += [late**2, late**3] if at > x[0] else [x**3]
+        at = (stop - frame[k] - 0.5) / SIDE
+        if x[0] < at < x[-1]:
+            columns.append(np.maximum(x - at, 0.0) ** 2)
+        design = np.stack(columns, axis=1)
+        if x.size < design.shape[1] + 4:
+            continue
+        inverse = np.linalg.pinv(design)
+        best = inverse @ row[near]
+        left = row[near] - design @ best
+        scatter = max(noise, float(np.sqrt(np.sum(left**2) / (x.size - design.shape[1]))))
+        jumps[k] = best[3]
+        if abs(best[3]) > LEAST_JUMP:
+            clear[k] = abs(best[3]) / (scatter * float(np.linalg.norm(inverse[3])))
+    return jumps, clear
+
+
+def _judge_after_stop(
+    frame: np.ndarray,
+    time: FloatArray,
+    row: FloatArray,
+    noise: float,
+    curve: DecelerationCurve,
+    camera: Camera,
+) -> list[str]:
+    """A second drop in the same track, or a tip that comes down again faster than it can fall."""
+    later = time > _find_stop(curve)
+    frame, time, row = frame[later], time[later], row[later]
+    above = row < camera.surface_row - max(CLEAR * noise, LEAST_JUMP)
+    if above.sum() >= CONSECUTIVE:
+        first, last = frame[above][0], frame[above][-1]
+        return [
+            f"after the stop the tip is above the surface again (frames {first}-{last}): two drops in one track? "
+            "Only the first is measured; cut the record after it"
+        ]
+    if row.size < 2 * SIDE:
+        return []
+    windows = np.lib.stride_tricks.sliding_window_view(np.arange(row.size), SIDE)
+    x = time[windows] - time[windows].mean(axis=1, keepdims=True)
+    speed = np.sum(x * row[windows], axis=1) / np.sum(x**2, axis=1)  # px/s of each SIDE rows
+    error = noise / np.sqrt(np.sum(x**2, axis=1))
+    fall = speed - PULL * STANDARD_GRAVITY / camera.pixel_size * time[windows].mean(axis=1)
+    slowest = np.minimum.accumulate(fall)[:-SIDE]
+    gain = fall[SIDE:] - slowest
+    best = int(np.argmax(gain / error[SIDE:]))
+    if gain[best] < CLEAR * np.sqrt(2) * error[SIDE + best]:
+        return []
+    return [
+        f"after the stop the tip comes down again faster than it can fall (about frame {frame[SIDE + best + SIDE // 2]}): "
+        "was it pushed, did the camera move, or is this another drop?"
+    ]
