@@ -17,6 +17,7 @@ from labsim.cli import main
 from labsim.cli import new as new_command
 from labsim.errors import CampaignError
 from labsim.inference.observe import observe_drops
+from labsim.inference.surface_rows import doubt_surface_rows
 
 P01 = Path(__file__).parents[1] / "data" / "campaigns" / "p01"
 CONTACT = 120  # frame of the first contact in D05 and D06, to a frame
@@ -243,6 +244,50 @@ def test_spikes_and_whole_pixels_are_no_jumps(campaign: Path, capsys: pytest.Cap
 
     change_rows(campaign, spoil)
     assert not any("jump" in line or "missing" in line for line in of(check(campaign, capsys), "D05"))
+
+
+@pytest.mark.parametrize("off", [10.0, -10.0])
+def test_a_surface_row_that_the_rows_contradict_is_named_with_theirs(
+    campaign: Path, capsys: pytest.CaptureFixture[str], off: float
+) -> None:
+    change_key(campaign / "drops/D05/drop.toml", "surface_row_px", lambda v: v + off)
+    found = check(campaign, capsys)
+    odd = [line for line in found["warnings"] if "the rows put the surface at row" in line]
+    assert len(odd) == 1 and odd[0].startswith("D05: ")
+    row, sigma = map(float, re.findall(r"row ([\d.]+) ± ([\d.]+) px", odd[0])[0])
+    assert abs(row - 297.53) < 3 * sigma and sigma < 2
+    assert doubt_surface_rows(read_campaign(campaign)) == [f"drop {odd[0]}"], (
+        "calibrate and diagnose say it too"
+    )
+
+
+def test_the_surface_row_is_not_blamed_for_a_wrong_scale(
+    campaign: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("D05", "D06"):
+        change_key(campaign / "drops" / name / "drop.toml", "pixel_size_um", lambda v: 1.06 * v)
+    found = check(campaign, capsys)
+    assert any("g = 10.3" in line for line in found["warnings"])
+    assert not any("surface" in line for line in found["warnings"])
+
+
+@pytest.mark.parametrize(("key", "factor"), [("mass_mg", 2.0), ("tip_radius_mm", 1.5)])
+def test_a_drop_that_takes_another_work_than_the_others_is_odd(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], key: str, factor: float
+) -> None:
+    folder = tmp_path / "c"
+    for name in ("D03", "D05", "D06", "D07", "D09", "D13", "D14"):
+        shutil.copytree(P01 / "drops" / name, folder / "drops" / name)
+    shutil.copy(P01 / "campaign.toml", folder)
+    assert check(folder, capsys)["warnings"] == []
+    change_key(folder / "drops/D06/drop.toml", key, lambda v: factor * v)
+    found = check(folder, capsys)["warnings"]
+    assert (
+        len(found) == 1
+        and found[0].startswith("D06: ")
+        and key in found[0]
+        and "the work per volume" in found[0]
+    )
 
 
 def test_one_drop_of_another_camera_is_not_the_fault_of_all(

@@ -22,6 +22,7 @@ from ..inference.measure import Measurements
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.settle import list_large, settle
+from ..inference.surface_rows import doubt_surface_rows
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from .average import average_p_m
@@ -160,6 +161,8 @@ def diagnose_campaign(
     )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
+    if found.p_value < FAILED:
+        warnings += doubt_surface_rows(campaign)
     if found.predicted < PREDICTED:
         warnings.append(
             f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not predict "

@@ -24,6 +24,7 @@ from .posterior import Posterior, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
 from .settle import list_large, settle
+from .surface_rows import doubt_surface_rows
 from .target import make_target
 from .workbench import Workbench
 
@@ -146,6 +147,7 @@ def calibrate(
             f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
             "diagnose asks why"
         )
+        doubts += doubt_surface_rows(campaign)
     return Calibration(
         campaign,
         bench,

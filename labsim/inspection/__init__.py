@@ -15,6 +15,7 @@ from ..repeated_records import refuse_repeated_rows
 from .drops import inspect_drop
 from .found import Found
 from .missing import list_missing
+from .resistance import judge_resistance
 from .scales import judge_scales
 from .scans import inspect_scan
 
@@ -56,6 +57,7 @@ def inspect_campaign(campaign: Campaign, progress: Progress) -> Inspection:
         scans.append(inspect_scan(scan, campaign))
         progress(len(drops) + len(scans), total, "reading drops and scans")
     _find_repeated(campaign, drops)
+    judge_resistance(campaign, drops)
     return Inspection(drops, scans, judge_scales(drops), list_missing(campaign))
 
 

@@ -6,6 +6,7 @@ import math
 
 from ..errors import LabsimError
 from ..inference.observe import read_observed_track
+from ..inference.surface_rows import doubt_surface_row
 from ..records import STANDARD_GRAVITY, Campaign, DecelerationCurve, Drop, Measured, Track
 from ..video import open_frames
 from ..video.curve import fit_deceleration
@@ -36,6 +37,8 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
     found.odd += [text for text in curve.warnings if not any(words in text for words in SAID_HERE)]
     found.odd += judge_frames(track, curve, drop.camera)
     _judge_fall(drop, track, curve, found)
+    if (doubt := doubt_surface_row(drop, track, curve)) is not None:
+        found.odd.append(doubt)
     if curve.penetration_depth.value > 0.5 * campaign.sample.depth:
         found.odd.append(
             f"comes to {curve.penetration_depth.value * 1e3:.2g} mm, more than half of the dust's depth: the floor is felt"
