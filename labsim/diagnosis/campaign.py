@@ -161,7 +161,7 @@ def diagnose_campaign(
     )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
-    if found.p_value < FAILED:
+    if found.p_value < REJECTED:
         warnings += doubt_surface_rows(campaign)
     if found.predicted < PREDICTED:
         warnings.append(

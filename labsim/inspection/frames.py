@@ -7,9 +7,12 @@ than gravity. Nothing is simulated for this; the fitted contact and stop only sa
 
 from __future__ import annotations
 
-import numpy as np
+import re
+from collections.abc import Sequence
 
-from ..inference.observe import deviate_robustly
+import numpy as np
+from scipy.ndimage import median_filter
+
 from ..records import STANDARD_GRAVITY, Camera, DecelerationCurve, FloatArray, Track
 from ..video.track_file import measure_scatter
 from .found import list_numbers
@@ -20,9 +23,10 @@ SIDE = 8  # frames on either side of a jump that is tested
 CLEAR = 6.0  # standard deviations of a jump or a fall: hundreds of places are tried, 4 is the most in an honest track
 LEAST_JUMP = 0.5  # px
 STRAY = 6.0  # standard deviations from the neighbours
-PULL = (
-    1.5  # times gravity that nothing exceeds after the stop, pixel size and frame rate being somewhat wrong
-)
+MEDIAN = 7  # frames of the running median: spikes of three frames and less are none of the motion
+PULL = 1.5  # times gravity that nothing exceeds after the stop, scales being somewhat wrong
+LOST_BEFORE = r"missing before frame (\d+)"  # how the curve's warnings say what is then not said again
+TWO_IMPACTS = "two impacts"
 
 
 def judge_frames(track: Track, curve: DecelerationCurve, camera: Camera) -> list[str]:
@@ -40,18 +44,27 @@ def judge_frames(track: Track, curve: DecelerationCurve, camera: Camera) -> list
             f"frame{'s' * (len(numbers) > 1)} {list_numbers(numbers)} repeat{'s' * (len(numbers) == 1)} the row before to "
             "the last digit while the projectile moves: pictures were doubled, and time is counted wrong from there"
         )
-    keep = ~_find_spikes(time, row, noise)
+    keep = ~_find_spikes(
+        row, curve.residual[good] if curve.residual is not None else np.zeros(row.size), noise
+    )
     frame, time, row = frame[keep], time[keep], row[keep]
     fitted = time <= track.time[curve.used].max() if curve.used is not None else np.ones(time.size, bool)
-    doubled = track.frame[good][repeats]
-    said += _judge_jumps(frame[fitted], time[fitted], row[fitted], noise, curve, doubled)
-    return said + _judge_after_stop(frame, time, row, noise, curve, camera)
+    known = [*track.frame[good][repeats], *_find_lost(curve)]
+    said += _judge_jumps(frame[fitted], time[fitted], row[fitted], noise, curve, known)
+    if not any(text.startswith(TWO_IMPACTS) for text in curve.warnings):
+        said += _judge_after_stop(frame, time, row, noise, curve, camera)
+    return said
 
 
 def count_missing(track: Track) -> int:
     """Frames between the first and the last that have no position."""
     seen = track.frame[track.valid & np.isfinite(track.tip_row)]
     return int(seen[-1] - seen[0] + 1 - seen.size) if seen.size else track.frame.size
+
+
+def _find_lost(curve: DecelerationCurve) -> list[int]:
+    """Frames before which the fit itself has found others missing."""
+    return [int(number) for text in curve.warnings for number in re.findall(LOST_BEFORE, text)]
 
 
 def _find_stop(curve: DecelerationCurve) -> float:
@@ -108,15 +121,19 @@ def _find_repeats(frame: np.ndarray, row: FloatArray, noise: float) -> np.ndarra
     return np.flatnonzero((step == 0) & (np.diff(frame) == 1) & (around > max(CLEAR * noise, LEAST_JUMP)))
 
 
-def _find_spikes(time: FloatArray, row: FloatArray, noise: float) -> np.ndarray:
-    """Rows far from their neighbours, one alone or two to the same side; the two sides of a jump are no spikes."""
-    deviation = deviate_robustly(time, row, noise)
-    stray = np.abs(deviation) > STRAY * noise
-    places = np.flatnonzero(stray)
-    for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
-        if run.size > 2 or (run.size == 2 and np.prod(deviation[run]) < 0):
-            stray[run] = False
-    return stray
+def _find_spikes(row: FloatArray, residual: FloatArray, noise: float) -> np.ndarray:
+    """Rows far from the running median of the fit's residuals, (n,) bool; the two sides of a jump are none.
+
+    Beyond the fit the projectile rests, and the rows themselves stand for their residuals.
+    """
+    left = np.where(np.isfinite(residual), residual, row)
+    spikes = np.zeros(row.size, bool)
+    for part in (np.isfinite(residual), ~np.isfinite(residual)):
+        if part.any():
+            spikes[part] = (
+                np.abs(left[part] - median_filter(left[part], MEDIAN, mode="nearest")) > STRAY * noise
+            )
+    return spikes
 
 
 def _judge_jumps(
@@ -125,9 +142,9 @@ def _judge_jumps(
     row: FloatArray,
     noise: float,
     curve: DecelerationCurve,
-    doubled: np.ndarray,
+    known: Sequence[int],
 ) -> list[str]:
-    """Steps of the row that no smooth motion makes, the clearest of each place; not where frames are known to be ``doubled``."""
+    """Steps of the row that no smooth motion makes, the clearest of each place, but for places that are known."""
     if row.size < 2 * SIDE + 4:
         return []
     tick = float(np.median(np.diff(time) / np.diff(frame)))
@@ -135,7 +152,7 @@ def _judge_jumps(
         (instant - time[0]) / tick + frame[0] for instant in (curve.contact_time.value, _find_stop(curve))
     )
     jumps, clear = _measure_jumps(frame.astype(float), row, noise, contact, stop)
-    for number in doubled:
+    for number in known:
         clear[np.abs(frame[:-1] - number) <= 2 * SIDE] = 0.0
     said: list[str] = []
     while clear.max() > CLEAR and len(said) < 3:
