@@ -34,7 +34,7 @@ from .records import (
     Record,
     Scan,
 )
-from .repeated_records import refuse_repeated_files
+from .repeated_records import refuse_repeated_records
 from .tables import Document, Table
 from .tracks import read_rows
 
@@ -68,7 +68,7 @@ def read_campaign(folder: Path | str) -> Campaign:
     read_scans = [read_scan(path) for path in list_parts(folder / "ct", "scan.toml")]
     scans = tuple(scan for scan in read_scans if isinstance(scan, Scan))
     _check_sequence(folder, drops)
-    refuse_repeated_files(folder, drops, scans)
+    refuse_repeated_records(folder, drops, scans)
     for wanted in planar.calibration_drops:
         if wanted not in {drop.name for drop in drops}:
             raise CampaignError(

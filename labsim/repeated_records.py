@@ -1,62 +1,71 @@
 """The same record filed twice: two drops or scans that cannot both be measurements, and would count as two.
 
-Noise never repeats, so that one file under two names, or rows that agree to the last digit, are one measurement.
+Noise never repeats, so that rows which agree to the last digit, or files which agree to the last byte, are one measurement.
 """
 
 from __future__ import annotations
 
 import filecmp
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from .errors import CampaignError
-from .records import Drop, Scan, Track
-from .tracks import find_format
+from .errors import CampaignError, MeasurementError
+from .records import Drop, Scan
+from .tracks import read_rows
 
 
-def refuse_repeated_files(campaign: Path, drops: Sequence[Drop], scans: Sequence[Scan]) -> None:
-    """Raise CampaignError where the files of two drops or of two scans are the same, byte for byte.
+def refuse_repeated_records(campaign: Path, drops: Sequence[Drop], scans: Sequence[Scan]) -> None:
+    """Raise CampaignError where two drops or two scans are one measurement.
 
-    A project of another program may hold the tracks of several drops: those are told apart by their rows.
+    Tracks are compared by their rows, whatever their frame numbers, columns, digits and line ends (one file of another program
+    may hold the tracks of several drops); videos, pictures and slices byte for byte.
     """
-    tracked = [
-        (campaign / "drops" / drop.name / "drop.toml", drop.record.path)
-        for drop in drops
-        if drop.record.path is not None
-        and not (drop.record.kind == "track" and find_format(drop.record.path))
-    ]
-    scanned = [(campaign / "ct" / scan.name / "scan.toml", scan.slices) for scan in scans]
-    for found, key in ((tracked, "record.file"), (scanned, "scan.slices")):
-        alike: dict[tuple[int, ...], list[tuple[Path, Path, list[Path]]]] = {}
-        for toml, record in found:
-            files = _list_files(record)
-            same_sizes = alike.setdefault(tuple(file.stat().st_size for file in files), [])
-            for other_toml, other_record, other_files in same_sizes:
-                if all(map(_same_bytes, files, other_files)):
-                    raise CampaignError(
-                        toml,
-                        key,
-                        f"{record} holds the same bytes as {other_record} of {other_toml.parent.name}, and one measurement "
-                        "counts once; name the right record, or remove one of the two folders",
-                    )
-            same_sizes.append((toml, record, files))
+    tracks, videos = [], []
+    for drop in drops:
+        if drop.record.path is not None:
+            toml = campaign / "drops" / drop.name / "drop.toml"
+            (tracks if drop.record.kind == "track" else videos).append((toml, drop.record.path, drop))
+    _compare_rows(tracks)
+    _compare_files([(toml, path) for toml, path, _ in videos], "record.file")
+    slices = [(campaign / "ct" / scan.name / "scan.toml", scan.slices) for scan in scans]
+    _compare_files(slices, "scan.slices")
 
 
-def refuse_repeated_rows(tracks: Iterable[tuple[Drop, Track]]) -> None:
-    """Raise CampaignError where two tracks have the same rows, whatever their frame numbers, columns and line ends."""
-    seen: dict[bytes, Drop] = {}
-    for drop, track in tracks:
-        row = track.tip_row[track.valid & np.isfinite(track.tip_row)]
-        earlier = seen.setdefault(np.ascontiguousarray(row).tobytes(), drop)
-        if earlier is not drop:
-            raise CampaignError(
-                drop.record.path,
-                "record.file",
-                f"has the same {row.size} rows as {earlier.record.path} of {earlier.name}, and one measurement counts once; "
-                "name the right record, or remove one of the two folders",
-            )
+def _compare_rows(tracks: Sequence[tuple[Path, Path, Drop]]) -> None:
+    seen: dict[bytes, tuple[Path, Path]] = {}
+    for toml, path, drop in tracks:
+        assert drop.camera is not None
+        try:
+            row = read_rows(path, drop.camera).row
+        except MeasurementError as trouble:
+            raise CampaignError(trouble.where, trouble.key, trouble.message) from None
+        row = row[np.isfinite(row)]
+        earlier = seen.setdefault(row.tobytes(), (toml, path))
+        if earlier[0] != toml:
+            raise _repeat(toml, "record.file", f"{path} has the same {row.size} rows as", earlier)
+
+
+def _compare_files(records: Sequence[tuple[Path, Path]], key: str) -> None:
+    """Sizes first; only where all are the same, bytes, up to the first that differs."""
+    alike: dict[tuple[int, ...], list[tuple[Path, Path, list[Path]]]] = {}
+    for toml, record in records:
+        files = _list_files(record)
+        same_sizes = alike.setdefault(tuple(file.stat().st_size for file in files), [])
+        for earlier, earlier_record, earlier_files in same_sizes:
+            if files and all(map(_same_bytes, files, earlier_files)):
+                raise _repeat(toml, key, f"{record} holds the same bytes as", (earlier, earlier_record))
+        same_sizes.append((toml, record, files))
+
+
+def _repeat(toml: Path, key: str, said: str, earlier: tuple[Path, Path]) -> CampaignError:
+    return CampaignError(
+        toml,
+        key,
+        f"{said} {earlier[1]} of {earlier[0].parent.name}, and one measurement counts once; name the right record, or remove "
+        "one of the two folders",
+    )
 
 
 def _list_files(record: Path) -> list[Path]:

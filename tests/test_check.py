@@ -16,7 +16,6 @@ from labsim.campaign import read_campaign
 from labsim.cli import main
 from labsim.cli import new as new_command
 from labsim.errors import CampaignError
-from labsim.inference.observe import observe_drops
 from labsim.inference.surface_rows import doubt_surface_rows
 
 P01 = Path(__file__).parents[1] / "data" / "campaigns" / "p01"
@@ -138,13 +137,22 @@ def test_the_same_file_twice_is_refused(campaign: Path) -> None:
     shutil.copytree(campaign / "drops/D05", campaign / "drops/D07")
     change_key(campaign / "drops/D07/drop.toml", "sequence", lambda v: v + 90)
     with pytest.raises(
-        CampaignError, match=r"D07.*record\.file: .*same bytes as .*D05.*track\.csv of D05.*remove"
+        CampaignError, match=r"D07.*record\.file: .*same 167 rows as .*D05.*track\.csv of D05.*remove"
     ):
         read_campaign(campaign)
     # a record outside its drop is that other drop's
     drop = campaign / "drops/D07/drop.toml"
     drop.write_text(drop.read_text().replace('"track.csv"', '"../D06/track.csv"'))
     with pytest.raises(CampaignError, match=r"of D06"):
+        read_campaign(campaign)
+
+
+def test_the_same_video_twice_is_refused(campaign: Path) -> None:
+    for name in ("D05", "D06"):
+        drop = campaign / "drops" / name / "drop.toml"
+        drop.write_text(drop.read_text().replace('"track.csv"', '"fall.avi"').replace('"track"', '"video"'))
+        (drop.parent / "fall.avi").write_bytes(b"one and the same")
+    with pytest.raises(CampaignError, match=r"D06.*record\.file: .*same bytes as .*fall\.avi of D05"):
         read_campaign(campaign)
 
 
@@ -171,17 +179,15 @@ def test_the_same_slices_twice_are_refused(campaign: Path) -> None:
     ],
     ids=["line ends", "digits", "frame numbers"],
 )
-def test_the_same_rows_twice_are_refused_by_check_and_by_what_fits_them(
-    campaign: Path, capsys: pytest.CaptureFixture[str], rewrite: Callable[[str], str]
+def test_the_same_rows_twice_are_refused_however_they_are_written(
+    campaign: Path, rewrite: Callable[[str], str]
 ) -> None:
     shutil.copytree(campaign / "drops/D05", campaign / "drops/D07")
     change_key(campaign / "drops/D07/drop.toml", "sequence", lambda v: v + 90)
     track = campaign / "drops/D07/track.csv"
     track.write_bytes(rewrite(track.read_text()).encode())
-    found = check(campaign, capsys, status=2)
-    assert [line[:4] for line in found["unreadable"]] == ["D07:"] and "same 167 rows" in found["error"]
-    with pytest.raises(CampaignError, match=r"same 167 rows as .* of D05"):
-        observe_drops(read_campaign(campaign))
+    with pytest.raises(CampaignError, match=r"D07.*record\.file: .*same 167 rows as .* of D05"):
+        read_campaign(campaign)
 
 
 def test_missing_frames_are_named_with_where_they_are(

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import Campaign, Drop, FloatArray, Track
-from ..repeated_records import refuse_repeated_rows
 from ..video.curve import fit_deceleration
 from ..video.track_file import read_track
 
@@ -90,21 +89,17 @@ def read_observed_track(drop: Drop) -> Track:
 def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
     """Every drop that shows something, and one line for each that does not.
 
-    Raises MeasurementError where none does: the first one's; CampaignError where one track is filed twice.
+    Raises MeasurementError where none does: the first one's.
     """
     seen: list[ObservedDrop] = []
-    tracks: list[tuple[Drop, Track]] = []
     failures: list[tuple[str, MeasurementError]] = []
     for drop in campaign.drops:
         if drop.record.kind == "summary":
             continue
         try:
-            track = read_observed_track(drop)
-            tracks.append((drop, track))
-            seen.append(observe_drop(drop, track))
+            seen.append(observe_drop(drop, read_observed_track(drop)))
         except MeasurementError as error:
             failures.append((drop.name, error))
-    refuse_repeated_rows(tracks)
     if failures and not seen:
         raise failures[0][1]
     return seen, [f"drop {name} left out: {error}" for name, error in failures]

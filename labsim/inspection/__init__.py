@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..errors import CampaignError, LabsimError
-from ..records import Campaign, Drop, Track
-from ..repeated_records import refuse_repeated_rows
+from ..errors import LabsimError
+from ..records import Campaign
 from .drops import inspect_drop
 from .found import Found
 from .missing import list_missing
@@ -56,19 +55,5 @@ def inspect_campaign(campaign: Campaign, progress: Progress) -> Inspection:
     for scan in campaign.scans:
         scans.append(inspect_scan(scan, campaign))
         progress(len(drops) + len(scans), total, "reading drops and scans")
-    _find_repeated(campaign, drops)
     judge_resistance(campaign, drops)
     return Inspection(drops, scans, judge_scales(drops), list_missing(campaign))
-
-
-def _find_repeated(campaign: Campaign, found: list[Found]) -> None:
-    """Drops whose rows are those of an earlier one cannot stand beside it."""
-    kept: list[tuple[Drop, Track]] = []
-    for drop, each in zip(campaign.drops, found, strict=True):
-        if each.track is None:
-            continue
-        try:
-            refuse_repeated_rows([*kept, (drop, each.track)])
-            kept.append((drop, each.track))
-        except CampaignError as trouble:
-            each.trouble = trouble

@@ -79,7 +79,6 @@ def _describe(drop: Drop, size: str, track: Track, curve: DecelerationCurve) -> 
             "penetration_depth_m": depth.value,
             "stopping_time_s": stop.value,
         },
-        track=track,
     )  # fmt: skip
     if lost > LOST_SHARE * (frames + lost):
         found.odd.append(f"{lost} of {frames + lost} frames have no position")

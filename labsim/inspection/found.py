@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import LabsimError
-from ..records import Measured, Track
+from ..records import Measured
 
 ODD = 3.0  # standard deviations
 SMALL_SHARE = 0.01  # relative: what is smaller is not worth a word
@@ -26,7 +26,6 @@ class Found:
     trouble: LabsimError | None = None
     gravity: Measured | None = None
     speed: Measured | None = None
-    track: Track | None = None
 
 
 def is_odd(ratio: Measured) -> bool:
