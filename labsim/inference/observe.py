@@ -60,9 +60,10 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
     time, depth = curve.clock[use], (track.tip_row[use] - drop.camera.surface_row) * pixel
     if depth.max() < 5 * sigma_px * pixel:
         raise MeasurementError(place, "tip_row_px", "never reaches the surface")
-    final = (
-        np.median(depth[depth > 0.8 * depth.max()]) if (depth > 0.8 * depth.max()).sum() > 6 else depth.max()
-    )
+    # where it comes to rest, from the whole record: after a rebound that is above the deepest point
+    rest = (rows - drop.camera.surface_row) * pixel
+    rest = rest[rest > 0.8 * depth.max()]
+    final = np.median(rest) if rest.size > 6 else depth.max()
     reached = np.nonzero(depth > final - 2 * sigma_px * pixel)[0]
     last = min(reached[0] + MARGIN, depth.size) if reached.size else depth.size
     return ObservedDrop(
