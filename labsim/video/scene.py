@@ -89,9 +89,9 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
         level = float(np.median(small[lit] / np.maximum(first[lit], 1.0)))
         duplicate.append(previous is not None and np.array_equal(picture, previous))
         previous = picture
-        peak = max(peak, int(picture.max()))
-        brightest = max(1, int(BRIGHTEST * small.size))
-        highest.append(float(np.partition(small, -brightest, axis=None)[-brightest]))
+        top = int(picture.max())
+        peak = max(peak, top)
+        highest.append(top if np.mean(small >= NEAR_CEILING * top) > BRIGHTEST else 0)
         brightness.append(level if level > 0 else 1.0)
         if len(sparse) < NOISE_FRAMES:
             sparse.append(small / brightness[-1])

@@ -20,12 +20,13 @@ from .scene import Scene
 HALF = 9  # px above and below the surface that are compared
 REACH = 6  # px, the largest shift that is looked for
 LEAST_COLUMNS = 8
-MOST_COLUMNS = 160  # beyond, every second or third is taken: their information is more than enough
+MOST_COLUMNS = 100  # beyond, every second or third is taken: their information is more than enough
 TOGETHER = 4.0  # times what the blocks do apart; flying dust and H.264 reach 3
 LEAST_SEEN = 0.03  # px rms
 LEAST_CORRECTED = (
     0.1  # px rms; noise in whole rows and focus that drifts make 0.03 to 0.06, which the rod does not share
 )
+MOST_CHANGED = 2.0  # times the misfit before contact: dust that only moves looks as before, flying dust does not
 MOST_PASSES = 6
 CHUNK = 500  # frames that are taken as floating numbers at a time
 
@@ -88,7 +89,10 @@ def follow_surface(
     aligned = [_align(stack[:, :, p], variance[:, p]) for p in parts]
     shifts = np.array([f[0] - np.median(f[0][before]) for f in aligned])
     error = float(np.median([f[1] for f in aligned]))
-    if not _move_together(shifts, error):
+    left = np.median([f[2] for f in aligned], axis=0)
+    moved = np.abs(np.median(shifts, axis=0)) > LEAST_CORRECTED
+    changed = np.median(left[moved]) > MOST_CHANGED * np.median(left[before]) if moved.any() else False
+    if changed or not _move_together(shifts, error):
         return None
     together = np.median(shifts, axis=0)
     together -= np.mean(together[before])
@@ -151,12 +155,13 @@ def _judge_once(stack: np.ndarray, mean: FloatArray, variance: FloatArray) -> tu
     return np.concatenate(shift).astype(float), float(np.sqrt(max(inverse[0, 0], 0.0)))
 
 
-def _align(stack: np.ndarray, variance: FloatArray) -> tuple[FloatArray, float]:
-    """Shift of one block in every frame against the mean of its frames, each moved back by its own shift; its error."""
+def _align(stack: np.ndarray, variance: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+    """Shift of one block in every frame against the mean of its frames, each moved back by its own shift; its error; and
+    the mean square of what is left in every frame, in units of the noise."""
     rows = np.arange(stack.shape[1], dtype=float)
     inside = slice(REACH // 2, stack.shape[1] - REACH // 2)
     weight = 1.0 / variance[inside].ravel()
-    shift = np.zeros(len(stack))
+    shift, left = np.zeros(len(stack)), np.ones(len(stack))
     inverse = np.eye(3)
     for _ in range(MOST_PASSES):
         known = shift.copy()
@@ -173,14 +178,17 @@ def _align(stack: np.ndarray, variance: FloatArray) -> tuple[FloatArray, float]:
                 design = np.stack([-slope, value, np.ones_like(value)], axis=1)  # (n, 3, pixels)
                 inverse = np.linalg.pinv((design * weight) @ design.transpose(0, 2, 1))
                 score = design @ (weight * (image - value))[:, :, None]
-                step = np.clip((inverse @ score)[:, 0, 0], -1.0, 1.0)
+                solved = inverse @ score
+                gained = np.sum(solved * score, axis=(1, 2))
+                left[part] = (np.sum(weight * (image - value) ** 2, axis=1) - gained) / weight.size
+                step = np.clip(solved[:, 0, 0], -1.0, 1.0)
                 shift[part] = np.clip(shift[part] + step, -REACH, REACH)
                 if np.abs(step).max() < 1e-3:
                     break
         shift -= np.mean(shift)
         if np.abs(shift - known).max() < 0.01:
             break
-    return shift, float(np.sqrt(max(np.median(inverse[:, 0, 0]), 0.0)))
+    return shift, float(np.sqrt(max(np.median(inverse[:, 0, 0]), 0.0))), left
 
 
 def _move_together(shifts: FloatArray, error: float) -> bool:

@@ -24,6 +24,7 @@ from .rod import LOSSY_TAILS, Positions, follow_rod
 from .scene import NEAR_CEILING, Scene, survey_scene
 from .steadiness import LEAST_CORRECTED, Movement, describe_movement, follow_surface
 
+MOST_SMEAR = 1.5  # steps per frame; beyond, with a radius for what the fit takes for smear
 LEAST_LEAN = 3.0  # degrees; the tracker finds 0.1, and 3 turn 5 % of the force aside
 
 
@@ -193,7 +194,9 @@ def _follow_bare_bead(
     )
     if frames.lossy:
         sigma = sigma * widen_for_hidden(frames.codec)
-    longest = float(np.nanmax(bead.smear))
+    longest, fastest = float(np.nanmax(bead.smear)), float(np.nanmax(np.abs(np.gradient(bead.y))))
+    if longest > MOST_SMEAR * fastest + bead.radius:
+        return None  # it would have been exposed for longer than a frame: a short rod
     if longest > 0.1 * bead.radius:
         warnings.append(
             f"the bead is smeared by up to {longest:.1f} px: it is followed as a smeared disc, rows are at mid exposure"
