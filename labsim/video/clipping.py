@@ -68,15 +68,15 @@ def _fit_edge(
     return float(q[0]), float(q[1]), float(q[3]) if free_base else 0.0, float(q[2])
 
 
-def measure_distance(opacity: FloatArray) -> tuple[FloatArray, int]:
-    """Signed distance (px, positive inside) of every pixel from the contour, and the number of its points."""
+def measure_distance(opacity: FloatArray, contour: float = CONTOUR) -> tuple[FloatArray, int]:
+    """Signed distance (px, positive inside) of every pixel from a contour, and the number of its points."""
     slope = np.stack(np.gradient(opacity), axis=-1)
     points, normals = [], []
     for axis in (0, 1):
         first = opacity[:-1] if axis == 0 else opacity[:, :-1]
         second = opacity[1:] if axis == 0 else opacity[:, 1:]
-        i, j = np.nonzero((first - CONTOUR) * (second - CONTOUR) < 0)
-        share = (CONTOUR - first[i, j]) / (second[i, j] - first[i, j])
+        i, j = np.nonzero((first - contour) * (second - contour) < 0)
+        share = (contour - first[i, j]) / (second[i, j] - first[i, j])
         di, dj = (1, 0) if axis == 0 else (0, 1)
         points.append(np.column_stack([i + share * di, j + share * dj]))
         normals.append((1 - share)[:, None] * slope[i, j] + share[:, None] * slope[i + di, j + dj])

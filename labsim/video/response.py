@@ -17,7 +17,8 @@ from .template import Template
 
 ACROSS = 5.0  # px on either side of the edge
 MOST_PIXELS = 1500
-SHARPEST = 0.7  # px of blur: a sharper edge has too few pixels on its flank to show its form
+SHARPEST = 0.8  # px of blur: a sharper edge has too few pixels on its flank to show its form
+LEAST_LEVEL = 0.15  # of the brighter one: below, the curve is so steep at its dark end that every error of an edge fits it
 LEAST_GAIN = 1.08  # by which γ must lower the sum of squares at both ends; sound recordings reach 1.03 at the better one
 
 
@@ -27,9 +28,9 @@ def find_gamma(template: Template, level: float, light: float) -> tuple[float, f
 
     level, light : grey levels of projectile and background. The black level is taken to be 0.
     """
-    if not (level > 1.0 and light > 1.0):
+    if not min(level, light) > LEAST_LEVEL * max(level, light):
         return None
-    distance, count = measure_distance(template.opacity)
+    distance, count = measure_distance(template.opacity, 0.5)
     near = np.flatnonzero(((np.abs(distance) < ACROSS) & template.known).ravel())
     if count < 12 or near.size < 200:
         return None

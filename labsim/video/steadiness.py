@@ -26,7 +26,9 @@ LEAST_SEEN = 0.03  # px rms
 LEAST_CORRECTED = (
     0.1  # px rms; noise in whole rows and focus that drifts make 0.03 to 0.06, which the rod does not share
 )
-MOST_CHANGED = 2.0  # times the misfit before contact: dust that only moves looks as before, flying dust does not
+MOST_CHANGED = (
+    2.0  # times the misfit before contact: dust that only moves looks as before, flying dust does not
+)
 MOST_PASSES = 6
 CHUNK = 500  # frames that are taken as floating numbers at a time
 

@@ -149,6 +149,7 @@ def test_error_bar_of_the_surface_that_is_found(record_property, wide) -> None:
         {"blur": 0.5},
         {"blur": 2.0},
         {"dark": 5.0},
+        {"dark": 6.0, "blur": 0.7},
         {"glare": 30.0},
         {"bead": True, "tip_radius": 30.0},
         {"tilt": 2.0, "surface_lumps": 1.0},
@@ -158,3 +159,27 @@ def test_error_bar_of_the_surface_that_is_found(record_property, wide) -> None:
 def test_sound_recordings_say_nothing(settings) -> None:
     _, _, text = follow(**settings)
     assert not text
+
+
+def test_flying_dust_is_not_dust_that_moves() -> None:
+    """Spray over the whole strip above the surface hides its edge on both sides alike."""
+    settings = {"spray": 0.2, "spray_height": 30.0, "blur": 1.7, "dark": 52.6, "dust": 75.0, "bright": 150.0}
+    settings |= {"shape": (264, 110), "width": 34.0, "length": 105.5, "surface_row": 192.7, "column": 53.9}
+    recording = Recording(**settings)
+    depth, _ = fall_and_stop(80, 40.0, 2.4, 10.5)
+    pictures, rows = render(recording, depth, 61)
+    seen = follow_projectile(make_frames(pictures))
+    assert not any("surface moves" in text for text in seen.track.warnings)
+    assert np.nanmax(np.abs(seen.track.tip_row - rows)) < 0.2
+
+
+@pytest.mark.parametrize("length", [66.0, 70.0])
+def test_a_short_rod_is_not_taken_for_a_smeared_bead(length) -> None:
+    recording = Recording(
+        width=45.0, length=length, shape=(249, 151), surface_row=181.8, column=78.1, blur=0.6
+    )
+    depth, _ = fall_and_stop(80, 40.0, 1.23, 21.0)
+    pictures, rows = render(recording, depth, 15)
+    seen = follow_projectile(make_frames(pictures), surface_row=recording.surface_row)
+    assert not any("bead" in text for text in seen.track.warnings)
+    assert np.sqrt(np.nanmean((seen.track.tip_row - rows) ** 2)) < 0.03
