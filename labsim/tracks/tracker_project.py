@@ -8,7 +8,9 @@ and y in pixels of the picture, y downwards, whatever axes and scale the user ha
 from __future__ import annotations
 
 import re
+import struct
 import zipfile
+import zlib
 from io import BytesIO
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -21,6 +23,19 @@ from . import Points
 
 NAME = "OSP Tracker projects (.trk, .trz)"
 LARGEST = 200_000_000  # bytes of XML; a project of an hour's video has a few
+
+
+# all that zipfile lets through where bytes of an archive are changed or missing
+DAMAGED_ZIP = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    EOFError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    ValueError,
+)
 
 
 def recognises(path: Path) -> bool:
@@ -96,7 +111,7 @@ def _unzip(path: Path) -> bytes:
                     path, "track", f"unpacks to {projects[0].file_size} bytes; that is no project"
                 )
             return archive.read(projects[0])
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, OSError) as trouble:
+    except DAMAGED_ZIP as trouble:
         raise MeasurementError(
             path, "track", f"is no zip file ({trouble}); save it again in Tracker"
         ) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import tifffile
+from PIL import Image
 
 from ...errors import MeasurementError
 from ..frames import Frames
@@ -69,7 +71,11 @@ def read_picture(path: Path) -> np.ndarray:
                 return make_grey(tifffile.imread(path), path)
             except ValueError:  # a compression that tifffile leaves to a package of its own
                 pass
-        picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE)
+        content = np.fromfile(path, np.uint8)
+        if path.suffix.lower() == ".png":
+            with Image.open(io.BytesIO(content)) as picture_file:
+                picture_file.verify()  # its checksums: libpng has words of its own for a damaged one
+        picture = cv2.imdecode(content, cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE)
     except MeasurementError:
         raise
     except Exception as trouble:
