@@ -27,6 +27,7 @@ import typer
 
 from .. import __version__
 from ..errors import LabsimError
+from ..inference.processes import silence_numerics
 from . import _provenance, options
 
 NOT_COMMANDS = {"options", "measured"}  # shared by commands
@@ -125,7 +126,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, _end_as_interrupted)
-        status = app(args=given, prog_name="labsim", standalone_mode=False)
+        with silence_numerics():
+            status = app(args=given, prog_name="labsim", standalone_mode=False)
     except LabsimError as trouble:
         options.drop_empty_folder()
         status = _complain(str(trouble), 2)

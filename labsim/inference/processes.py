@@ -12,9 +12,12 @@ import multiprocessing
 import os
 import queue
 import signal
+import sys
 import threading
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -131,9 +134,24 @@ def _say_end(exitcode: int | None) -> str:
     return f"exit status {exitcode}"
 
 
+@contextmanager
+def silence_numerics() -> Iterator[None]:
+    """Without numpy's RuntimeWarning of an empty mean or a division by nought, whose lines of source say nothing to who
+    runs a command: what comes of them is not finite, and is checked where it matters. ``python -W`` has the last word."""
+    with warnings.catch_warnings():
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore", RuntimeWarning)
+        yield
+
+
 def _work(pipe: Connection) -> None:
     """What a worker does until its parent is gone."""
     _begin()
+    with silence_numerics():
+        _answer(pipe)
+
+
+def _answer(pipe: Connection) -> None:
     while True:
         try:
             fn, args, kwargs = pipe.recv()

@@ -121,3 +121,24 @@ def test_a_request_to_end_is_taken_as_ctrl_c(begin, tmp_path: Path, whom: str) -
     assert process.returncode == 143, said
     assert said.splitlines() == ["error: stopped; start the same command again to go on from the stored runs"]
     assert not [child for child in children if Path(f"/proc/{child}/cmdline").exists()]
+
+
+def test_a_command_says_what_went_wrong_in_its_own_words_only(
+    capsys: pytest.CaptureFixture[str], monkeypatch
+) -> None:
+    """Not numpy's, with its lines of source."""
+    import numpy as np
+
+    import labsim.cli
+
+    def command(**how: object) -> int:
+        assert np.isnan(np.mean(np.array([])))
+        return 0
+
+    monkeypatch.setattr(labsim.cli, "app", command)
+    monkeypatch.setattr(sys, "warnoptions", [])
+    with pytest.raises(SystemExit):
+        labsim.cli.main(["check"])
+    assert capsys.readouterr().err == ""
+    with pytest.warns(RuntimeWarning):  # outside a command they stay
+        np.mean(np.array([]))
