@@ -27,6 +27,8 @@ def make_track(path: Path | str, rows: TrackRows, row_sigma: float | None) -> Tr
     """Rows of a file as a Track: error bars and gaps. ``row_sigma`` as for ``read_track``. Raises MeasurementError."""
     frame, row = rows.frame, rows.row
     valid = np.isfinite(row)
+    if not valid.any():
+        raise MeasurementError(path, "tip_row_px", "stands in no row; export the whole track again")
     warnings = list(rows.warnings)
     missing = int(frame[-1] - frame[0] + 1 - len(frame)) + int(np.sum(~valid))
     if missing:

@@ -97,3 +97,14 @@ def test_a_damaged_png_is_refused_by_its_checksums(tmp_path: Path, capfd: pytest
         with pytest.raises(MeasurementError, match=r"a\.png: picture: cannot be read"):
             read_picture(file)
     assert capfd.readouterr().err == ""
+
+
+def test_a_table_that_ends_after_its_header_is_one_line(tmp_path: Path) -> None:
+    from labsim.records import Camera
+    from labsim.video import read_track
+
+    (tmp_path / "a.txt").write_text("\tmass A\t\t\t\nt\tx\ty\tpixely\tframe\n")
+    (tmp_path / "b.csv").write_text("frame,tip_row_px\n0,\n1,\n")
+    for name in ("a.txt", "b.csv"):
+        with pytest.raises(MeasurementError, match=name):
+            read_track(tmp_path / name, Camera(1e4, 2e-5, 300.0, 0.1), 0.1)
