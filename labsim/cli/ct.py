@@ -60,7 +60,7 @@ def ct(
     """
     from ..campaign_scans import read_sample_alone, read_scan, read_scans
 
-    tables = {
+    tables: dict[str, dict[str, Any]] = {
         "projectile": {"radius_mm": bead_radius_mm, "mass_mg": bead_mass_mg},
         "scan": {"voxel_um": voxel_um, "first_slice": first_slice, "bits": bits},
         "calibration": {
@@ -77,7 +77,11 @@ def ct(
         sample, scans = read_scans(scan)
         if not scans:
             raise CampaignError(scan / "ct", "", "holds no scan with slices; there is nothing to reduce")
-        given = {"cell": cell, "guard": guard, "sample": sample_filling_factor or sample.filling_factor}
+        given: dict[str, Any] = {
+            "cell": cell,
+            "guard": guard,
+            "sample": sample_filling_factor or sample.filling_factor,
+        }
         items = [Item(each.name, scan / "ct" / each.name, given) for each in scans]
         target = make_output_folder(out, scan, "ct")
         with show_progress(quiet) as progress:

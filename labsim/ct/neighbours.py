@@ -36,6 +36,8 @@ NOISE_LEAST = (
     0.005  # of the step from air to dust: slices without noise still have a compacted zone that bends
 )
 STEP_LEAST = 0.5  # chi2 per block above the usual; 24 labelled scans reach 0.20 and 0.61 in the two regions, of 0.5 and 1.0
+DUST = "the dust about the bead"
+DUST_STEPS = DUST + " jumps"  # how its own warnings begin
 WINDOW = 4  # slices on each side of a step
 MARGIN = 4.0  # voxels about the bead, and beyond the surface's width, that are left out
 
@@ -80,9 +82,9 @@ def check_neighbours(stack: SliceStack, bead: Bead, surface: Surface, top: float
     distance = np.hypot(x[None, :], y[:, None])
     found: dict[tuple[int, int], list[str]] = {}
     for what, pairs in (
-        ("the dust's level far from the bead", _find_levels(blocks, distance, bead, surface)),
+        ("the dust's level far from the bead", _find_levels(blocks, distance, bead, surface, size)),
         ("the bead's outline", _find_outlines(stack, bead, surface, top)),
-        ("the dust about the bead", _find_steps(blocks, distance, bead, surface, size)),
+        (DUST, _find_steps(blocks, distance, bead, surface, size)),
     ):
         for pair in pairs:
             if what not in found.setdefault(pair, []):
@@ -112,7 +114,7 @@ def _spread(values: FloatArray) -> float:
 
 
 def _find_levels(
-    blocks: FloatArray, distance: FloatArray, bead: Bead, surface: Surface
+    blocks: FloatArray, distance: FloatArray, bead: Bead, surface: Surface, size: int
 ) -> list[tuple[int, int]]:
     """Single slices whose dust or air far from the bead is brighter or darker than their neighbours'."""
     far = distance > min(3.3 * bead.stated_radius, 0.85 * distance.max())
@@ -122,8 +124,15 @@ def _find_levels(
     rows = np.arange(len(level))
     use = np.abs(rows - surface.row) > MARGIN + 3 * surface.width + lean
     odd = []
-    for part in (use & (rows < surface.row), use & (rows > surface.row)):
-        limit = max(ODD * _spread(off[part]), LEVEL_LEAST * (surface.dust - surface.air))
+    voxels = far.sum() * size**2
+    for part, scatter in (
+        (use & (rows < surface.row), surface.air_scatter),
+        (use & (rows > surface.row), surface.dust_scatter),
+    ):
+        noise = max(
+            _spread(off[part]), scatter / np.sqrt(voxels)
+        )  # of a few rows the spread is itself uncertain
+        limit = max(ODD * noise, LEVEL_LEAST * (surface.dust - surface.air))
         odd += [
             (max(k - 1, 0), min(k + 1, len(rows) - 1)) for k in np.flatnonzero(part & (np.abs(off) > limit))
         ]

@@ -14,7 +14,7 @@ from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
 from .bead import Bead, find_bead
 from .bead_edge import WIDE, find_widest
 from .grey import GreyCheck, check_grey, check_levels, to_filling_factor, warn_of_grey
-from .neighbours import check_neighbours, find_doubled
+from .neighbours import DUST_STEPS, check_neighbours, find_doubled
 from .stack import SliceStack, open_stack
 from .surface import Surface, find_surface
 from .systematic import find_directions, find_halo
@@ -35,10 +35,9 @@ RINGS_SEEN = 0.3  # share of the slices that must show rings before any are take
 class ReducedScan:
     """Everything ``reduce_scan`` found.
 
-    map.sigma is random error only; the calibration's scale error is common to all cells. correlation_r/z : between
-    neighbouring cells of the undisturbed dust. blur : m, standard deviation of the point spread (bead edge, across the
-    axis). dust_mass : kg within the map outside the guard; mass_excess : kg, of filling factor above the undisturbed,
-    per ``ledger_mass`` (kg of dust that the bead displaced).
+    map.sigma is random error and what the picture shows beyond it (``systematic``); the calibration's scale error is common to
+    all cells. correlation_r/z : between neighbouring cells of the undisturbed dust. blur : m, standard deviation of the point
+    spread (bead edge, across the axis).
     """
 
     scan: Scan
@@ -113,8 +112,9 @@ def reduce_scan(
     report(1, 4, "surface")
     x, y, k_bead = bead.centre
     surface = find_surface(stack, (x, y), k_bead, bead.stated_radius)
+    breaks: list[str] = []
     if scan.projectile.tip == "sphere":
-        warnings += check_neighbours(stack, bead, surface, 2**scan.bits - 1)
+        breaks = check_neighbours(stack, bead, surface, 2**scan.bits - 1)
     report(2, 4, "azimuthal mean")
     surface_row = surface.along_normal(k_bead)
     ny, nx = stack.shape
@@ -206,6 +206,9 @@ def reduce_scan(
             rows > surface_row + 2 + 2 * surface.width,
         ),
     ]  # fmt: skip
+    if systematic[0].warnings:  # streaks end with the bead's last slice, and the dust steps there
+        breaks = [text for text in breaks if not text.startswith(DUST_STEPS)]
+    warnings += breaks
     for each in systematic:
         sigma = np.hypot(sigma, each.size)
         warnings += each.warnings

@@ -14,6 +14,8 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
+# filling factor of dust, measured and simulated alike, so that pictures can be compared by eye
+PHI: dict[str, Any] = {"cmap": "viridis", "vmin": 0.12, "vmax": 0.30}
 STYLE: Any = {
     "font.size": 10.0,
     "axes.spines.top": False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -13,27 +14,24 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from ..records import CompressedVolume, FillingMap, FloatArray
-
-LEVELS = np.arange(
-    -0.0125, 0.3876, 0.025
-)  # no edge at 0.15, where the noise of undisturbed dust would flicker
+from .look import PHI
 
 
 def draw_map(scan_map: FillingMap, undisturbed: float, path: Path, title: str = "") -> Path:
     """map.png: filling factor mirrored about the axis, with the bead; beside it the standard error of every cell."""
     figure, axes = plt.subplots(1, 2, figsize=(12.5, 6.2), layout="constrained")
-    image = _show(axes[0], scan_map, scan_map.filling_factor, LEVELS, "turbo")
+    image = _show(axes[0], scan_map, scan_map.filling_factor, PHI)
     r, z, phi = _mirror(scan_map, scan_map.filling_factor)
     lines = axes[0].contour(r, z, phi, [0.16, 0.20, 0.25], colors="k", linewidths=[0.5, 1.4, 1.0])
     axes[0].clabel(lines, fmt="%.2f", fontsize=8)
-    figure.colorbar(image, ax=axes[0], label="filling factor", ticks=np.arange(0, 0.376, 0.05))
+    figure.colorbar(image, ax=axes[0], label="filling factor", extend="both")
     axes[0].set_title(
         f"{title}  undisturbed {undisturbed:.4f}, tip {scan_map.tip_depth * 1e3:.3f} mm deep".strip()
     )
     top = np.nanpercentile(scan_map.sigma, 99)
-    image = _show(axes[1], scan_map, scan_map.sigma, np.linspace(0, top, 21), "magma")
+    image = _show(axes[1], scan_map, scan_map.sigma, {"cmap": "magma", "vmin": 0.0, "vmax": top})
     figure.colorbar(image, ax=axes[1], label="standard error of a cell", format="%.4f")
-    axes[1].set_title("random error (the calibration's scale not included)")
+    axes[1].set_title("error (the calibration's scale not included)")
     figure.savefig(path, dpi=110)
     plt.close(figure)
     return path
@@ -65,10 +63,9 @@ def _mirror(scan_map: FillingMap, values: FloatArray) -> tuple[FloatArray, Float
     return r, scan_map.z * 1e3, np.concatenate([values[:, ::-1], values], axis=1)
 
 
-def _show(axis: Axes, scan_map: FillingMap, values: FloatArray, levels: FloatArray, colours: str):  # type: ignore[no-untyped-def]
+def _show(axis: Axes, scan_map: FillingMap, values: FloatArray, colours: dict[str, Any]):  # type: ignore[no-untyped-def]
     r, z, mirrored = _mirror(scan_map, values)
-    norm = matplotlib.colors.BoundaryNorm(levels, 256, extend="max")
-    image = axis.pcolormesh(r, z, mirrored, norm=norm, cmap=colours, shading="nearest")
+    image = axis.pcolormesh(r, z, mirrored, shading="nearest", **colours)
     radius, centre = scan_map.bead_radius * 1e3, (scan_map.bead_radius - scan_map.tip_depth) * 1e3
     axis.add_patch(Circle((0, centre), radius, facecolor="#9b1b1b", edgecolor="k", lw=1.0, zorder=3))
     axis.text(0, centre, "bead", color="w", ha="center", va="center", zorder=4)

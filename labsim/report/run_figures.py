@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from ..records import FloatArray
 from ..sph import DropRun, DropSetting
-from .look import BLUE, GREY, INK, new_figure
+from .look import BLUE, GREY, INK, PHI, new_figure
 
 
 def draw_run(run: DropRun, path: Path) -> Path:
@@ -79,9 +79,7 @@ def fill_density_field(
     reach = np.where(rows > 0.0, 0.5, 1.0)[:, None] * setting.spacing
     field = np.where(distance < reach, phi[nearest], np.nan)
     axes = figure.add_subplot()
-    drawn = axes.pcolormesh(
-        columns * 1e3, rows * 1e3, field, cmap="viridis", vmin=0.12, vmax=0.30, rasterized=True
-    )
+    drawn = axes.pcolormesh(columns * 1e3, rows * 1e3, field, **PHI, rasterized=True)
     centre = radius - depth
     angle = np.linspace(0.0, 2 * np.pi, 181)
     if setting.projectile.tip == "hemisphere":
