@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -128,16 +129,15 @@ def choose_motion(
             if lead is not None:
                 starts = [(lead.motion.parameters[0], lead.motion.parameters[1])]
             here: Candidate | None = None
-            for begin in starts:
-                used = first if lead is None else lead.used
+            # a poor model leaves out frames that a better one explains: begin again from the first guess too
+            begins = [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]
+            for begin, used in product(starts, begins):
                 fitted = fit_without_outliers(time, depth, error, degree, ending, begin, used)
                 if fitted is None or (stops and not _is_sound(fitted[0], time[fitted[1]])):
                     continue
-                candidate = _weigh_outliers(*fitted)
+                candidate = _weigh_outliers(*fitted, time)
                 if here is None or candidate.judge(1.0) < here.judge(1.0):
                     here = candidate
-                if candidate.motion.chi_square < 2.0 * candidate.motion.freedom:
-                    break
             if here is None:
                 continue
             found.append(here)
@@ -145,9 +145,6 @@ def choose_motion(
                 lead = here
             if degree > lead.motion.degree + 2:
                 break
-    # fewer than AFTER_END frames beyond the end of the deceleration show neither rest nor rebound: one spike can make them
-    seen = [c for c in found if not stops or np.sum(time[c.used] > c.motion.parameters[1]) >= AFTER_END]
-    found = seen or found
     if not found:
         return None
     best = min(found, key=lambda candidate: candidate.judge(1.0))
@@ -163,10 +160,15 @@ def choose_motion(
     )
 
 
-def _weigh_outliers(motion: Motion, used: np.ndarray) -> Candidate:
+def _weigh_outliers(motion: Motion, used: np.ndarray, time: FloatArray) -> Candidate:
+    """OUTLIER² for each frame left out, and for each that is wanting of AFTER_END beyond the end of the deceleration:
+
+    where so few frames show rest or rebound, one spike can make them.
+    """
     spread = max(1.0, motion.chi_square / max(motion.freedom, 1))
-    chi_square = motion.chi_square + OUTLIER**2 * spread * float(np.sum(~used))
-    return Candidate(motion, used, chi_square)
+    beyond = int(np.sum(time[used] > motion.parameters[1])) if motion.ending != "open" else AFTER_END
+    many = int(np.sum(~used)) + max(AFTER_END - beyond, 0)
+    return Candidate(motion, used, motion.chi_square + OUTLIER**2 * spread * many)
 
 
 def _is_sound(motion: Motion, time: FloatArray) -> bool:
