@@ -316,7 +316,7 @@ def fit_motion(
         jacobian = np.column_stack([slope(q, linear), matrix])
     except (ValueError, np.linalg.LinAlgError):
         return None
-    scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-100)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) / scale / scale[:, None]
     if opened:
         covariance = np.insert(np.insert(covariance, 1, 0.0, axis=0), 1, 0.0, axis=1)

@@ -19,6 +19,7 @@ from labsim.inference.posterior import measure_residual, sample
 from labsim.inference.scans import Block
 from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
+from labsim.video.synthetic import evaluate_motion
 
 
 def sine_code(depth=1e-3, stop=2e-3):
@@ -153,6 +154,25 @@ def test_free_fall_gives_contact_and_speed_and_outliers_go():
     assert observed.contact_time == pytest.approx(0.0081, abs=1e-5)
     assert observed.impact_speed == pytest.approx(0.785, rel=2e-3)
     assert observed.time.max() < 0.0081 + 2.6e-3  # what follows the stop is left out
+
+
+def test_a_hard_stop_loses_no_frame():
+    """14 px per frame stopped within four frames: every row up to the stop is observed, spikes before contact are not."""
+    drop = make_drop()
+    camera = drop.camera
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        step = 14 * camera.pixel_size * camera.frame_rate
+        stop = 4.4 / camera.frame_rate
+        time = np.arange(90) / camera.frame_rate
+        depth = evaluate_motion(time - 40.3 / camera.frame_rate, step, stop, STANDARD_GRAVITY, -0.3)
+        row = camera.surface_row + depth / camera.pixel_size + rng.normal(0, 0.02, 90)
+        row[[12, 30]] += [3.0, -20.0]
+        track = Track(np.arange(90), time, row, np.full(90, 0.02), np.ones(90, bool), ("",) * 90)
+        observed = observe_drop(drop, track)
+        kept = set(np.round(observed.time * camera.frame_rate).astype(int))
+        assert kept >= set(range(46)) - {12, 30} and not kept & {12, 30}
+        assert observed.rejected == 2
 
 
 def test_globals_are_generalised_least_squares():
