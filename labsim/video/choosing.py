@@ -121,10 +121,10 @@ def choose_motion(
     span = start[1] - start[0]
     first = ~guess_spikes(depth, error)
     found: list[Candidate] = []
-    endings: tuple[Ending, ...] = ("rest", "ease", "rebound") if stops else ("open",)
+    endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce") if stops else ("open",)
     for ending in endings:
         lead: Candidate | None = None
-        for degree in range({"rest": 0, "ease": 1, "rebound": 1, "open": 1}[ending], HIGHEST_DEGREE + 1):
+        for degree in range({"rest": 0, "bounce": 0}.get(ending, 1), HIGHEST_DEGREE + 1):
             starts = [(start[0], start[0] + factor * span) for factor in (1.0, 1.2, 1.5)]
             if lead is not None:
                 starts = [(lead.motion.parameters[0], lead.motion.parameters[1])]

@@ -163,11 +163,8 @@ def _describe(
     ):
         warnings.append(again)
     rebound = None
-    if motion.ending == "rebound" and stopped:
-        rebound = measure(
-            lambda m, p: -m.evaluate(np.array([p[1]]), p)[1][0] if m.ending == "rebound" else np.nan,
-            by_scale=1.0,
-        )
+    if motion.ending in ("rebound", "bounce") and stopped:
+        rebound = measure(_find_rebound_speed, by_scale=1.0)
         if rebound.value < 2 * rebound.sigma:
             rebound = None
 
@@ -222,6 +219,15 @@ def _describe(
         degree=motion.degree,
         clock=track.time,
     )
+
+
+def _find_rebound_speed(motion: Motion, parameters: FloatArray) -> float:
+    """Speed upwards (m/s) just after the deceleration; NaN where the model has none."""
+    if motion.ending == "bounce":
+        return -float(parameters[-2])
+    if motion.ending == "rebound":
+        return -float(motion.evaluate(parameters[1:2], parameters)[1][0])
+    return float("nan")
 
 
 def _refit_with_surface(

@@ -5,7 +5,8 @@ Depth z below the undisturbed surface, t0 the contact, te the end of the deceler
 - t < t0: z = v0 (t - t0) + g (t - t0)²/2, with g free;
 - t0 ≤ t ≤ te: acceleration Σ c_k P_k(2u - 1), Legendre polynomials up to the degree that the data ask for;
 - t > te: at rest (then v(te) = 0, which fixes c_0 = -v0/(te - t0)) or, after a "rebound", a free speed and a constant
-  acceleration. "ease" is a rest that is reached without a jump of the acceleration: Σ c_k = 0. "open": the record ends
+  acceleration. "ease" is a rest that is reached without a jump of the acceleration: Σ c_k = 0; "bounce" is a rebound whose push lasts less than a frame: v(te) = 0, and a free
+  speed at once. "open": the record ends
   before the projectile does.
 
 Position and speed are continuous, the acceleration may jump at t0 and te. For given t0 and te the model is linear in
@@ -26,14 +27,13 @@ from ..records import STANDARD_GRAVITY, FloatArray
 
 GRAVITY_PRIOR_SIGMA = 3.0  # m/s^2; only steadies v0 where few frames lie before the contact
 
-Ending = Literal["rest", "ease", "rebound", "open"]
+Ending = Literal["rest", "ease", "rebound", "bounce", "open"]
 
 
 @dataclass(frozen=True)
 class Motion:
-    """One fitted motion. parameters = (t0, te, v0, g, c…, [rebound acceleration]) in SI; covariance alike.
-
-    At rest c_0 is not among them, at ease nor is the last c.
+    """One fitted motion. parameters = (t0, te, v0, g, c…, [speed of a bounce], [acceleration after rebound
+    or bounce]) in SI; covariance alike. At rest and at a bounce c_0 is not among them, at ease nor is the last c.
     """
 
     degree: int
@@ -53,7 +53,7 @@ class Motion:
         """Time after contact (s) at which the speed first falls to ``fraction`` of the impact speed; NaN if never."""
         p = self.parameters if parameters is None else parameters
         span = p[1] - p[0]
-        if fraction == 0.0 and self.ending in ("rest", "ease"):
+        if fraction == 0.0 and self.ending in ("rest", "ease", "bounce"):
             return float(span)
         s = np.linspace(0.0, 1.0, 201)
         speed = self.evaluate(p[0] + s * span, p)[1] - fraction * p[2]
@@ -136,23 +136,29 @@ def _design(
     s = np.where(before, t - t0, 0.0)
     e = np.where(after, t - te, 0.0)
     integrals = _integrate_legendre((t[inside] - t0) / span, degree, orders)
-    columns = [np.zeros((degree + 3 + (ending == "rebound"), len(t))) for _ in range(orders)]
+    columns = [
+        np.zeros((degree + 3 + {"rebound": 1, "bounce": 2}.get(ending, 0), len(t))) for _ in range(orders)
+    ]
     z = columns[0]
     z[0], z[1] = np.where(before, s, np.clip(t - t0, 0.0, span) + e), 0.5 * s**2
     # at te: ∫ P_0 = 1, ∫∫ P_0 = 1/2, ∫∫ P_1 = -1/6, all others vanish there
     z[2, after] = 0.5 * span**2 + span * e[after]
     if degree > 0:
         z[3, after] = -(span**2) / 6.0
-    if ending == "rebound":
+    if ending in ("rebound", "bounce"):
         z[-1] = 0.5 * e**2
+    if ending == "bounce":
+        z[-2] = e
     if orders > 1:
         v = columns[1]
         v[0], v[1], v[2, after] = 1.0, s, span
-        if ending == "rebound":
+        if ending in ("rebound", "bounce"):
             v[-1] = e
+        if ending == "bounce":
+            v[-2] = after
     if orders > 2:
         columns[2][1] = before
-        if ending == "rebound":
+        if ending in ("rebound", "bounce"):
             columns[2][-1] = after
     for k, rows in enumerate(columns):
         rows[2 : degree + 3, inside] = span ** (2 - k) * integrals[k]
@@ -160,7 +166,7 @@ def _design(
         for rows in columns:
             rows[2:-1] -= rows[-1]
         columns = [rows[:-1] for rows in columns]
-    if ending in ("rest", "ease"):  # v(te) = 0: c_0 = -v0/span
+    if ending in ("rest", "ease", "bounce"):  # v(te) = 0: c_0 = -v0/span
         for rows in columns:
             rows[0] -= rows[2] / span
             rows[2:-1] = rows[3:]
@@ -173,9 +179,10 @@ def _differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Endin
     t0, te, v0, g = p[:4]
     span = te - t0
     c, by_span = np.zeros(degree + 1), np.zeros(degree + 1)  # all coefficients; how they change with te - t0
-    if ending in ("rest", "ease"):
+    if ending in ("rest", "ease", "bounce"):
         c[0], by_span[0] = -v0 / span, v0 / span**2
-        c[1 : 1 + len(p) - 4] = p[4:]
+        given = degree - (ending == "ease")
+        c[1 : 1 + given] = p[4 : 4 + given]
         if ending == "ease":
             c[degree] = -np.sum(c[:degree])
             by_span[degree] = -by_span[0]
@@ -190,7 +197,8 @@ def _differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Endin
     if degree > 0:
         end[1] = -1.0 / 6.0
     e = t[after] - te
-    push = p[-1] if ending == "rebound" else 0.0
+    push = p[-1] if ending in ("rebound", "bounce") else 0.0
+    kick = p[-2] if ending == "bounce" else 0.0
     slopes = np.zeros((len(t), 2))
     slopes[before, 0] = -v0 - g * (t[before] - t0)
     for k, (grows, since) in enumerate(((-1.0, -1.0), (1.0, 0.0))):  # how te - t0 and t - t0 change
@@ -205,7 +213,7 @@ def _differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Endin
             + 2 * span * grows * (c @ end)
             + span**2 * grows * (by_span @ end)
             + grows * (c[0] + span * by_span[0]) * e
-            - (k == 1) * (v0 + span * c[0] + push * e)
+            - (k == 1) * (v0 + span * c[0] + kick + push * e)
         )
     return slopes
 
@@ -248,14 +256,16 @@ def fit_motion(
     time (s), depth and sigma (m): shape (n,). With an "open" end te is held at the last frame and the speed there is free.
     """
     opened = ending == "open"
-    columns = 2 + degree + 1 + {"rest": -1, "ease": -2, "rebound": 1, "open": 0}[ending]
+    columns = 2 + degree + 1 + {"rest": -1, "ease": -2, "rebound": 1, "bounce": 1, "open": 0}[ending]
     if len(time) < columns + 4 or (ending == "ease" and degree < 1):
         return None
     spacing = float(np.median(np.diff(time)))
     duration = time[-1] - time[0]
     reach = 3.0 * spacing + 0.15 * (start[1] - start[0])
     low = np.array([start[0] - reach, start[0] + 2.0 * spacing])
-    high = np.array([start[0] + reach, time[-1] + (0.0 if ending == "rebound" else 0.5 * duration)])
+    high = np.array(
+        [start[0] + reach, time[-1] + (0.0 if ending in ("rebound", "bounce") else 0.5 * duration)]
+    )
     early = time < low[0]
     free = _FreeFall(time[early], depth[early], sigma[early]) if np.sum(early) > 4 else None
     if free is not None:
