@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
 from ..errors import MeasurementError
-from ..records import FloatArray, Scan
+from ..records import FloatArray, Measured, Scan
 from .bead_edge import REACH, WIDE, cut_box, find_widest, fit_blur, fit_clipped_edge, fit_wide_blur
 from .bead_size import measure_size, say_what_fits, warn_of_density, warn_of_size
 from .neighbours import find_bright_jumps
@@ -88,9 +88,9 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
     size = measure_size(box, fit, radius, level, top, directions, outside, tree)
     warnings = warn_of_density(scan, top if saturated else level, saturated)
     if size is not None:
-        warnings += warn_of_size(scan, *size, saturated)
+        warnings += warn_of_size(scan, *size, level / top if saturated else None)
     elif not saturated:  # where the half level is clipped the radius reads large
-        warnings += warn_of_size(scan, radius, None, saturated)
+        warnings += warn_of_size(scan, Measured(radius, 0.0), None, None)
     if (
         saturated
     ):  # the half level may be cut off; the whole edge, clipped as it was recorded, still tells the centre

@@ -7,16 +7,17 @@ from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 from scipy.special import erfc
 
-from ..records import FloatArray, Scan
+from ..records import FloatArray, Measured, Scan
 from .bead_edge import REACH, WIDE
 
 BAND = (
     0.85  # cosine to the vertical up to which the edge counts: the poles tell blur along the axis, not size
 )
-RADIUS_OFF = (
-    0.03  # relative. 24 labelled scans with saturated beads read 0.5 to 0.8 % small, phantoms up to 2.3 %
-)
-HEIGHT_OFF = 0.025  # the same of height over width: at most 0.7 % off
+# relative, of radius and of height over width; 24 labelled scans with saturated beads are off by at most 0.8 and 0.7 %
+RADIUS_OFF, HEIGHT_OFF = 0.03, 0.025
+# voxels, more where the edge is cut far below its middle: for a grey level of once the range, and for every further range
+CLIPPED_RADIUS, CLIPPED_HEIGHT = (0.15, 0.12), (0.3, 0.25)
+SURE = 4.0  # standard deviations of the fit
 DENSITY_OFF = 1.35  # factor: attenuation per density of glasses differs by 1.2 from silica's, beam hardening takes as much
 HEAVY = 12000.0  # kg/m^3, above lead
 
@@ -24,8 +25,8 @@ HEAVY = 12000.0  # kg/m^3, above lead
 def measure_size(
     box: FloatArray, start: FloatArray, radius: float, level: float, top: float,
     directions: FloatArray, outside: FloatArray, tree: cKDTree,
-) -> tuple[float, float] | None:  # fmt: skip
-    """(radius across the axis in voxels, height over width) of an ellipsoid of grey ``level``, blurred and clipped at ``top``.
+) -> tuple[Measured, Measured] | None:  # fmt: skip
+    """Radius across the axis in voxels, and height over width, of an ellipsoid of grey ``level``, blurred and clipped at ``top``.
 
     Blur along the axis is another than across. None where the edge is too wide for this (WIDE) or gives no fit.
     """
@@ -54,7 +55,9 @@ def measure_size(
     fit = least_squares(misfit, first, bounds=(low, high), loss="soft_l1", f_scale=0.05 * top, max_nfev=40)
     if fit.x[3] > WIDE:
         return None
-    return float(fit.x[4]), float(fit.x[5])
+    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * 2 * fit.cost / max(len(grey) - 7, 1)
+    sigma = np.sqrt(np.diag(covariance))
+    return Measured(float(fit.x[4]), float(sigma[4])), Measured(float(fit.x[5]), float(sigma[5]))
 
 
 def say_what_fits(scan: Scan, radius: float) -> str:
@@ -65,21 +68,27 @@ def say_what_fits(scan: Scan, radius: float) -> str:
     )
 
 
-def warn_of_size(scan: Scan, radius: float, height: float | None, saturated: bool) -> list[str]:
-    """radius : voxels; height : over width."""
+def warn_of_size(scan: Scan, radius: Measured, height: Measured | None, clipped: float | None) -> list[str]:
+    """radius : voxels; height : over width; clipped : grey level of a saturated bead over the top of the range, else None."""
     stated = scan.projectile.tip_radius / scan.voxel
-    if abs(radius / stated - 1) > RADIUS_OFF:
+
+    def is_odd(ratio: float, sigma: float, least: float, voxels: tuple[float, float]) -> bool:
+        cut = 0.0 if clipped is None else (voxels[0] + voxels[1] * max(clipped - 1, 0.0)) / stated
+        return abs(ratio - 1) > max(least, cut) + SURE * sigma
+
+    saturated = clipped is not None
+    if is_odd(radius.value / stated, radius.sigma / stated, RADIUS_OFF, CLIPPED_RADIUS):
         by = (
             ", or another mass_mg: a saturated bead is measured at the grey level that its density would have"
         )
         return [
-            f"the bead's radius is {radius:.2f} voxels but {stated:.2f} are stated: {say_what_fits(scan, radius)}"
+            f"the bead's radius is {radius.value:.2f} voxels but {stated:.2f} are stated: {say_what_fits(scan, radius.value)}"
             + (by if saturated else "")
         ]
-    if height is not None and abs(height - 1) > HEIGHT_OFF:
+    if height is not None and is_odd(height.value, height.sigma, HEIGHT_OFF, CLIPPED_HEIGHT):
         return [
-            f"the bead is {height:.3f} times as high as it is wide: the slices lie {1 / height:.3f} pixels apart "
-            f"({scan.voxel * 1e6 / height:.4g} µm), or some are lost or doubled; depths are off by as much, export cubic voxels"
+            f"the bead is {height.value:.3f} times as high as it is wide: the slices lie "
+            f"{1 / height.value:.3f} pixels apart ({scan.voxel * 1e6 / height.value:.4g} µm), or some are lost or doubled; depths are off by as much, export cubic voxels"
         ]
     return []
 

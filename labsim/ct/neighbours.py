@@ -194,18 +194,23 @@ def _find_steps(
     noise *= np.sqrt(2 * (ahead**2).sum())
     regions = [about & (distance < reach * bead.stated_radius) for reach in REGIONS]
     chi2 = np.ones((len(regions), len(places)))
+    number = np.zeros(chi2.shape)
     for i, k in enumerate(places):
         before, after = blocks[k - WINDOW + 1 : k + 1], blocks[k + 1 : k + 1 + WINDOW]
         nearest = np.clip(bead.centre[2], k - WINDOW + 1, k + WINDOW)
         hidden = np.sqrt(max((bead.radius + MARGIN + 0.7 * size) ** 2 - (nearest - bead.centre[2]) ** 2, 0.0))
         pull = ((np.tensordot(ahead[::-1], after, 1) - np.tensordot(ahead, before, 1)) / noise) ** 2
-        for region, values in zip(regions, chi2, strict=True):
+        for j, region in enumerate(regions):
             use = region & (distance > hidden)
-            if use.sum() > 8:
-                values[i] = pull[use].mean()
+            number[j, i] = use.sum()
+            if number[j, i] > 8:
+                chi2[j, i] = pull[use].mean()
     found = []
-    for values in chi2:
-        odd = values > np.median(values) + np.maximum(ODD * _spread(values), STEP_LEAST)
+    for values, blocks_used in zip(chi2, number, strict=True):
+        beyond = values - np.median(values)
+        # a mean over few blocks, where the bead hides the others, scatters more
+        alike = beyond * np.sqrt(blocks_used / max(blocks_used.max(), 1))
+        odd = (alike > ODD * _spread(alike)) & (beyond > STEP_LEAST)
         for i in np.flatnonzero(odd):  # a step shows in the windows around it: its largest is where it is
             if values[i] == values[max(0, i - WINDOW) : i + WINDOW + 1].max():
                 found.append((int(places[i]), int(places[i]) + 1))

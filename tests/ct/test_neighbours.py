@@ -108,6 +108,22 @@ def test_sound_phantoms_are_left_in_peace(reduced_phantoms, changes, seed):
     assert not re.search("jump|same picture|high", said), said
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"radius": 8.9, "centre": (51.8, 51.1, 29.3), "noise": 0.1, "saturated": True, "bits": 8},
+        {"radius": 8.2, "centre": (46.0, 52.0, 34.3), "noise": 0.1, "saturated": True, "gradient": 10.0},
+        {"radius": 11.4, "centre": (51.8, 51.5, 43.4), "blur": 0.97, "zone_width": 1.07},
+        {"radius": 13.9, "centre": (52.0, 54.3, 43.7), "noise": 0.01, "saturated": True, "zone": 0.03},
+        {"radius": 10.4, "centre": (47.5, 48.5, 41.2), "saturated": True, "gradient": 10.0},
+    ],
+)
+@pytest.mark.parametrize("seed", [12, 13])
+def test_other_sound_beads_are_left_in_peace(reduced_phantoms, changes, seed):
+    said = "; ".join(reduced_phantoms(seed=seed, **changes)[1].map.warnings)
+    assert not re.search("jump|same picture|as high|are stated|halo|opposite", said), said
+
+
 def test_slices_without_noise_may_be_alike(tmp_path):
     find_doubled(open_stack(Phantom(noise=0.0).write(tmp_path / "s").slices))
 
