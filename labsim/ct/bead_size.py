@@ -87,8 +87,9 @@ def warn_of_size(scan: Scan, radius: Measured, height: Measured | None, clipped:
         ]
     if height is not None and is_odd(height.value, height.sigma, HEIGHT_OFF, CLIPPED_HEIGHT):
         return [
-            f"the bead is {height.value:.3f} times as high as it is wide: the slices lie "
-            f"{1 / height.value:.3f} pixels apart ({scan.voxel * 1e6 / height.value:.4g} µm), or some are lost or doubled; depths are off by as much, export cubic voxels"
+            f"the bead is {height.value:.3f} times as high as it is wide: the slices lie {1 / height.value:.3f} pixels apart "
+            f"({scan.voxel * 1e6 / height.value:.4g} µm), or some are lost or doubled; depths are off by as much, "
+            "export cubic voxels"
         ]
     return []
 
