@@ -60,6 +60,7 @@ VALUES = [
     '"' + "x" * 5000 + '"',
 ]
 FIELDS = ["", "nan", "inf", "1e400", "-5", "abc", "1,2", "0x10", '"', "1e9", "0", "300.5"]
+DIGITS = "0123456789"
 KEYS = ["format", "x", "é", '"a b"', "a.b.c"]
 JUNK = [
     None,
@@ -237,8 +238,12 @@ def mutate(content: bytes, how: str, chance: random.Random) -> tuple[bytes, list
         return change_json(content.decode(), changes).encode(), changes
     for _ in range(chance.choice([1, 1, 1, 2, 3])):
         if how == "text" and chance.random() < 0.7:
-            kind = chance.choice(["value", "key", "without", "twice", "field", "field"])
-            extra = chance.choice({"value": VALUES, "key": KEYS, "field": FIELDS}.get(kind, [""]))
+            kind = chance.choice(
+                ["value", "key", "without", "twice", "field", "field", "digit", "digit", "digit"]
+            )
+            extra = chance.choice(
+                {"value": VALUES, "key": KEYS, "field": FIELDS, "digit": DIGITS}.get(kind, [""])
+            )
             change: Any = (kind, chance.random(), extra)
             content = change_text(content.decode("utf-8", errors="replace"), change).encode(
                 "utf-8", errors="replace"

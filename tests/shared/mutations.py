@@ -41,6 +41,11 @@ def change_text(text: str, change: tuple[str, float, str]) -> str:
         lines[at] = f"{extra} ={value}"
     elif kind == "without":
         del lines[at]
+    elif kind == "digit":
+        places = [k for k, sign in enumerate(lines[at]) if sign.isdigit()]
+        if places:
+            k = places[int(place * 997) % len(places)]
+            lines[at] = lines[at][:k] + extra + lines[at][k + 1 :]
     elif kind == "twice":
         lines.insert(at, lines[at])
     else:
