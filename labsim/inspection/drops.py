@@ -35,7 +35,7 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
         return Found(drop.name, f"{size}: no motion can be fitted", trouble=trouble)
     found = _describe(drop, size, track, curve)
     found.odd += [text for text in curve.warnings if not any(words in text for words in SAID_HERE)]
-    found.odd += judge_frames(track, curve, drop.camera)
+    found.odd += judge_frames(track, curve)
     _judge_fall(drop, track, curve, found)
     if (doubt := doubt_surface_row(drop, track, curve)) is not None:
         found.odd.append(doubt)

@@ -1,70 +1,53 @@
-"""What the rows of one track contradict: frames that are missing, left out, repeated, or of another drop.
+"""What the rows of one track contradict: frames that are missing, left out, doubled, or after a jump.
 
 Rows follow one motion: free fall, a deceleration, rest or a small rebound. They cannot jump (a projectile has no infinite
-speed), not agree to the last digit while it moves (noise does not repeat), and after the stop nothing pulls down faster
-than gravity. Nothing is simulated for this; the fitted contact and stop only say where the acceleration may change.
+speed) and not agree to the last digit while it moves (noise does not repeat). The curve's fit says which frames it stands on,
+and finds frames that were lost and second impacts by itself (``labsim.video.curve``); here the rows are looked at beside it.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ..records import STANDARD_GRAVITY, Camera, DecelerationCurve, FloatArray, Track
+from ..records import DecelerationCurve, FloatArray, Track
 from ..video.track_file import measure_scatter
 from .found import list_numbers
 
 CONSECUTIVE = 3  # frames in a row that are worth a word
 MANY_LEFT_OUT = 0.05  # of the fitted frames; honest tracks have one spike in a hundred frames
 SIDE = 8  # frames on either side of a jump that is tested
-CLEAR = 6.0  # standard deviations of a jump or a fall: hundreds of places are tried, 4 is the most in an honest track
+CLEAR = 6.0  # standard deviations of a jump: hundreds of places are tried, 4 is the most in an honest track
 LEAST_JUMP = 0.5  # px
 STRAY = 6.0  # standard deviations from the neighbours
 MEDIAN = 7  # frames of the running median: spikes of three frames and less are none of the motion
-PULL = 1.5  # times gravity that nothing exceeds after the stop, scales being somewhat wrong
-LOST_BEFORE = r"missing before frame (\d+)"  # how the curve's warnings say what is then not said again
-TWO_IMPACTS = "two impacts"
 
 
-def judge_frames(track: Track, curve: DecelerationCurve, camera: Camera) -> list[str]:
+def judge_frames(track: Track, curve: DecelerationCurve) -> list[str]:
     """What is odd in the frames of a track, one line each."""
+    assert curve.used is not None and curve.residual is not None
     good = track.valid & np.isfinite(track.tip_row)
-    frame, time, row = track.frame[good], track.time[good], track.tip_row[good]
+    clock = (track.time if curve.clock is None else curve.clock)[good]
+    frame, row = track.frame[good], track.tip_row[good]
     noise = float(np.median(track.sigma[good]))
-    if np.isfinite(scatter := measure_scatter(time, row)):
+    if np.isfinite(scatter := measure_scatter(clock, row)):
         noise = max(noise, scatter)  # whole pixels, say
     repeats = _find_repeats(frame, row, noise)
-    said = _judge_gaps(frame, time, curve) + _judge_left_out(track, curve)
+    said = _judge_gaps(frame, clock, curve) + _judge_left_out(track, curve)
     if repeats.size:
         numbers = [int(number) for number in frame[repeats + 1]]
         said.append(
             f"frame{'s' * (len(numbers) > 1)} {list_numbers(numbers)} repeat{'s' * (len(numbers) == 1)} the row before to "
             "the last digit while the projectile moves: pictures were doubled, and time is counted wrong from there"
         )
-    keep = ~_find_spikes(
-        row, curve.residual[good] if curve.residual is not None else np.zeros(row.size), noise
-    )
-    frame, time, row = frame[keep], time[keep], row[keep]
-    fitted = time <= track.time[curve.used].max() if curve.used is not None else np.ones(time.size, bool)
-    known = [*track.frame[good][repeats], *_find_lost(curve)]
-    said += _judge_jumps(frame[fitted], time[fitted], row[fitted], noise, curve, known)
-    if not any(text.startswith(TWO_IMPACTS) for text in curve.warnings):
-        said += _judge_after_stop(frame, time, row, noise, curve, camera)
-    return said
+    keep = ~_find_spikes(row, curve.residual[good], noise) & (clock <= clock[curve.used[good]].max())
+    return said + _judge_jumps(frame[keep], clock[keep], row[keep], noise, curve, frame[repeats])
 
 
 def count_missing(track: Track) -> int:
     """Frames between the first and the last that have no position."""
     seen = track.frame[track.valid & np.isfinite(track.tip_row)]
     return int(seen[-1] - seen[0] + 1 - seen.size) if seen.size else track.frame.size
-
-
-def _find_lost(curve: DecelerationCurve) -> list[int]:
-    """Frames before which the fit itself has found others missing."""
-    return [int(number) for text in curve.warnings for number in re.findall(LOST_BEFORE, text)]
 
 
 def _find_stop(curve: DecelerationCurve) -> float:
@@ -138,20 +121,19 @@ def _find_spikes(row: FloatArray, residual: FloatArray, noise: float) -> np.ndar
 
 def _judge_jumps(
     frame: np.ndarray,
-    time: FloatArray,
+    clock: FloatArray,
     row: FloatArray,
     noise: float,
     curve: DecelerationCurve,
-    known: Sequence[int],
+    known: np.ndarray,
 ) -> list[str]:
-    """Steps of the row that no smooth motion makes, the clearest of each place, but for places that are known."""
+    """Steps of the row that no smooth motion makes, the clearest of each place, but for frames where they are known."""
     if row.size < 2 * SIDE + 4:
         return []
-    tick = float(np.median(np.diff(time) / np.diff(frame)))
-    contact, stop = (
-        (instant - time[0]) / tick + frame[0] for instant in (curve.contact_time.value, _find_stop(curve))
+    tick = float(np.median(np.diff(clock) / np.diff(frame)))
+    jumps, clear = _measure_jumps(
+        clock / tick, row, noise, curve.contact_time.value / tick, _find_stop(curve) / tick
     )
-    jumps, clear = _measure_jumps(frame.astype(float), row, noise, contact, stop)
     for number in known:
         clear[np.abs(frame[:-1] - number) <= 2 * SIDE] = 0.0
     said: list[str] = []
@@ -201,39 +183,3 @@ def _measure_jumps(
         if abs(best[3]) > LEAST_JUMP:
             clear[k] = abs(best[3]) / (scatter * float(np.linalg.norm(inverse[3])))
     return jumps, clear
-
-
-def _judge_after_stop(
-    frame: np.ndarray,
-    time: FloatArray,
-    row: FloatArray,
-    noise: float,
-    curve: DecelerationCurve,
-    camera: Camera,
-) -> list[str]:
-    """A second drop in the same track, or a tip that comes down again faster than it can fall."""
-    later = time > _find_stop(curve)
-    frame, time, row = frame[later], time[later], row[later]
-    above = row < camera.surface_row - max(CLEAR * noise, LEAST_JUMP)
-    if above.sum() >= CONSECUTIVE:
-        first, last = frame[above][0], frame[above][-1]
-        return [
-            f"after the stop the tip is above the surface again (frames {first}-{last}): two drops in one track? "
-            "Only the first is measured; cut the record after it"
-        ]
-    if row.size < 2 * SIDE:
-        return []
-    windows = np.lib.stride_tricks.sliding_window_view(np.arange(row.size), SIDE)
-    x = time[windows] - time[windows].mean(axis=1, keepdims=True)
-    speed = np.sum(x * row[windows], axis=1) / np.sum(x**2, axis=1)  # px/s of each SIDE rows
-    error = noise / np.sqrt(np.sum(x**2, axis=1))
-    fall = speed - PULL * STANDARD_GRAVITY / camera.pixel_size * time[windows].mean(axis=1)
-    slowest = np.minimum.accumulate(fall)[:-SIDE]
-    gain = fall[SIDE:] - slowest
-    best = int(np.argmax(gain / error[SIDE:]))
-    if gain[best] < CLEAR * np.sqrt(2) * error[SIDE + best]:
-        return []
-    return [
-        f"after the stop the tip comes down again faster than it can fall (about frame {frame[SIDE + best + SIDE // 2]}): "
-        "was it pushed, did the camera move, or is this another drop?"
-    ]

@@ -80,7 +80,7 @@ def test_every_key_of_a_new_campaign_is_explained(tmp_path: Path) -> None:
     (folder / "campaign.toml").write_text(re.sub(r"(?m)^# (?=\[(?:model|source)|\w+ = )", "", written))
     rows = "".join(f"{k},{200 + 4 * k}\n" for k in range(60))
     (folder / "drops/D01/track.csv").write_text("frame,tip_row_px\n" + rows)
-    (folder / "ct/C01/slices/0.tif").write_bytes(b"")
+    (folder / "ct/C01/slices/0.tif").write_bytes(b"II*\0")
     read = read_campaign(folder)
     assert read.name == "a 'new' series" and len(read.drops) == 1 and len(read.scans) == 1
 
