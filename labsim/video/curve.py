@@ -13,7 +13,8 @@ from .checks import find_second_impact, fit_gravity, measure_alikeness
 from .choosing import Choice, choose_motion, guess_ends
 from .gaps import find_lost_frames
 from .outliers import follow_median
-from .segments import Motion, fit_motion
+from .segments import Motion
+from .variable_projection import fit_motion
 
 AFTER_STOP = 0.5  # share of the stopping time that is fitted beyond the stop
 WIDENINGS = 4  # times that the end of what is fitted is moved on where the stop lies beyond the first guess
@@ -23,11 +24,13 @@ LEAST_AFTER = 12.5  # frames that are, at least: dust that springs back pushes f
 def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") -> DecelerationCurve:
     """Fit free flight, deceleration, rest or rebound to a track and return the motion with its uncertainties.
 
-    The degree of the deceleration's polynomial and the choice between rest and rebound are made by the data (Akaike's
-    criterion). Outliers (more than 5 robust standard deviations) are left out and counted in the warnings. All sigmas
-    hold the noise of the rows (raised where the fit scatters more than the error bars say, and where neighbouring frames
-    err alike) and the uncertainty of the
-    surface row, and of the pixel size where ``camera`` gives one; not of the frame rate. ``name`` stands in messages.
+    Models of every degree that end in rest, in a rebound or in the open are weighed by the data (Schwarz's criterion); all
+    figures are means over them, and what the models disagree is in the sigmas. A frame is an outlier where the fitted motion
+    cannot explain it (5 robust standard deviations); every frame is judged anew after each fit, and ``used`` says which are
+    in. Frames that the clock hides are found by the motion: ``clock`` holds the times that the fit took. Sigmas also hold the
+    noise of the rows (raised where the fit scatters more than the error bars say, and where neighbouring frames err alike),
+    the uncertainty of the surface row, and of the pixel size where ``camera`` gives one; not of the frame rate. ``name``
+    stands in messages.
 
     Raises MeasurementError where there are too few frames or the surface is never reached. Where the record ends
     before the projectile does, depth and stopping time are NaN and a warning says so.

@@ -7,7 +7,7 @@ import numpy as np
 from ..records import FloatArray
 from .choosing import Choice, choose_motion
 from .outliers import OUTLIER, guess_spikes
-from .segments import fit_motion
+from .variable_projection import fit_motion
 
 BESIDE = 3  # steps on either side that say how far the projectile goes in one frame
 LEAST_STEP = 17.0  # error bars per frame: below, a missing frame cannot be told from noise

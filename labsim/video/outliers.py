@@ -11,7 +11,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ..records import FloatArray
-from .segments import Ending, Motion, fit_motion
+from .segments import Ending, Motion
+from .variable_projection import fit_motion
 
 OUTLIER = 5.0  # standard deviations; a frame left out costs a fit OUTLIER² of χ²
 RANGE = 5  # frames of the running median
