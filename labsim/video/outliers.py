@@ -68,7 +68,8 @@ def fit_without_outliers(
     used: np.ndarray,
 ) -> tuple[Motion, np.ndarray] | None:
     """One model fitted, its outliers dropped and taken back until they stand still: (motion, frames used)."""
-    seen = []
+    seen: list[np.ndarray] = []
+    motion: Motion | None = None
     for _ in range(ROUNDS):
         motion = fit_motion(time[used], depth[used], error[used], degree, ending, start)
         if motion is None:
@@ -80,4 +81,5 @@ def fit_without_outliers(
             return None
         seen.append(used)
         used, start = renewed, (motion.parameters[0], motion.parameters[1])
+    assert motion is not None
     return motion, used
