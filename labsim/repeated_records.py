@@ -22,7 +22,8 @@ def refuse_repeated_records(campaign: Path, drops: Sequence[Drop], scans: Sequen
     Tracks are compared by their rows, whatever their frame numbers, columns, digits and line ends (one file of another program
     may hold the tracks of several drops); videos, pictures and slices byte for byte.
     """
-    tracks, videos = [], []
+    tracks: list[tuple[Path, Path, Drop]] = []
+    videos: list[tuple[Path, Path, Drop]] = []
     for drop in drops:
         if drop.record.path is not None:
             toml = campaign / "drops" / drop.name / "drop.toml"

@@ -35,9 +35,10 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
         return Found(drop.name, f"{size}: no motion can be fitted", trouble=trouble)
     found = _describe(drop, size, track, curve)
     found.odd += [text for text in curve.warnings if not any(words in text for words in SAID_HERE)]
-    found.odd += judge_frames(track, curve)
+    found.odd += (torn := judge_frames(track, curve))
     _judge_fall(drop, track, curve, found)
-    if (doubt := doubt_surface_row(drop, track, curve)) is not None:
+    # where frames are torn apart, they put contact anywhere
+    if not torn and (doubt := doubt_surface_row(drop, track, curve)) is not None:
         found.odd.append(doubt)
     if curve.penetration_depth.value > 0.5 * campaign.sample.depth:
         found.odd.append(
