@@ -112,9 +112,9 @@ def jump(after_contact: int | None, size: float = 5.0) -> RowChange:
 
 
 def bounce(frame: np.ndarray, row: np.ndarray, contact: int) -> Rows:
-    """After the stop a parabola of 12 px up and down again, within thirty frames."""
-    at = contact + 35
-    s = np.clip((np.arange(row.size) - at) / 30, 0, 1)
+    """After the stop a parabola of 12 px up and down again, within twenty frames."""
+    at = contact + 20
+    s = np.clip((np.arange(row.size) - at) / 20, 0, 1)
     return frame, row - 48 * s * (1 - s)
 
 
