@@ -15,7 +15,10 @@ from .segments import HIGHEST_DEGREE, Ending, Motion
 
 AFTER_END = 3  # frames used beyond the end of the deceleration
 LEAST_STRIDE = 4  # frames over which a speed is guessed
-EASE = 0.05  # odds of a push that has faded to nothing at the stop, before the rows are looked at: dust has strength
+ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
+    "ease": 0.05,  # a push that has faded to nothing at the stop: dust has strength
+    "bounce": 0.2,  # a push that is over within a frame: dust springs back over some frames
+}
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
 NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
 
@@ -30,7 +33,7 @@ class Candidate:
 
     def judge(self, noise: float) -> float:
         """Schwarz's criterion, -2 ln(evidence), for a noise level of ``noise`` times the error bars, squared."""
-        odds = 2.0 * np.log(1.0 / EASE) if self.motion.ending == "ease" else 0.0
+        odds = -2.0 * np.log(ODDS.get(self.motion.ending, 1.0))
         return self.chi_square / noise + np.log(len(self.used)) * len(self.motion.parameters) + odds
 
 
