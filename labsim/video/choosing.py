@@ -17,7 +17,6 @@ AFTER_END = 3  # frames used beyond the end of the deceleration
 LEAST_STRIDE = 4  # frames over which a speed is guessed
 ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
     "ease": 0.05,  # a push that has faded to nothing at the stop: dust has strength
-    "bounce": 0.2,  # a push that is over within a frame: dust springs back over some frames
 }
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
 NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
@@ -126,6 +125,8 @@ def choose_motion(
     found: list[Candidate] = []
     endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce") if stops else ("open",)
     for ending in endings:
+        if ending == "bounce" and any(_follows(candidate) for candidate in found):
+            continue  # a bounce fits a rebound of some frames nearly as well, with a later stop: only where all else fails
         lead: Candidate | None = None
         for degree in range({"rest": 0, "bounce": 0}.get(ending, 1), HIGHEST_DEGREE + 1):
             starts = [(start[0], start[0] + factor * span) for factor in (1.0, 1.2, 1.5)]
@@ -161,6 +162,13 @@ def choose_motion(
         weights[kept] / weights[kept].sum(),
         stops,
     )
+
+
+def _follows(candidate: Candidate) -> bool:
+    """Whether the rows scatter about the motion as they say, fewer than a tenth of them left out."""
+    motion, most = candidate.motion, 0.1 * len(candidate.used)
+    enough = motion.chi_square < motion.freedom + 2.0 * np.sqrt(2.0 * max(motion.freedom, 1))
+    return bool(enough and np.sum(~candidate.used) < most)
 
 
 def _weigh_outliers(motion: Motion, used: np.ndarray, time: FloatArray) -> Candidate:
