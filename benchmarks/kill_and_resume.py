@@ -84,7 +84,8 @@ class Study:
 
 def list_workers(pid: int) -> list[int]:
     """Worker processes of a running command."""
-    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    threads = Path(f"/proc/{pid}/task").glob("*/children")  # each worker is started by a thread of its own
+    children = [child for thread in threads for child in thread.read_text().split()]
     return [int(c) for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
 
 

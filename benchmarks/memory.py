@@ -38,7 +38,8 @@ def _family(pid: int) -> list[int]:
     found = [pid]
     for member in found:
         try:
-            found += map(int, Path(f"/proc/{member}/task/{member}/children").read_text().split())
+            for thread in Path(f"/proc/{member}/task").glob("*/children"):
+                found += map(int, thread.read_text().split())
         except OSError:
             continue
     return found

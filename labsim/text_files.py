@@ -26,7 +26,7 @@ def load_toml(path: Path, error: type[LabsimError], remedy: str) -> dict[str, An
     text = _read(path, LARGEST_TOML, error, remedy)
     try:
         found = tomllib.loads(text)
-    except RecursionError:
+    except (RecursionError, MemoryError):  # it keeps every part of a dotted key with all parts before it
         raise error(path, "", f"is nested too deep; {remedy}") from None
     except ValueError as trouble:  # TOMLDecodeError is one, and so are Python's own about numbers and dates
         raise error(path, "", f"is not TOML: {trouble}; correct that line") from None

@@ -19,6 +19,7 @@ from pathlib import Path
 import filelock
 import numpy as np
 import pytest
+from attempts import list_children
 
 from labsim.errors import InferenceError
 from labsim.inference.run_file import HEAD, make_key, read_run_file, write_run_file
@@ -110,7 +111,7 @@ def test_a_sweep_killed_at_a_random_instant_goes_on(begin, tmp_path: Path, seed:
 def test_a_killed_worker_is_said_and_costs_what_was_in_flight(begin, tmp_path: Path) -> None:
     process = begin("simulate", *SWEEP, "-o", tmp_path / "out", "--workers", 2)
     wait_for(tmp_path / "store", 1, process)
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    children = list_children(process.pid)
     workers = [int(c) for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
     os.kill(workers[0], signal.SIGKILL)
     process.communicate(timeout=120)

@@ -109,3 +109,9 @@ def _survey(root: Path, out: str) -> dict[str, str]:
             elif path.is_file():
                 found[str(relative)] = hashlib.sha256(path.read_bytes()).hexdigest()
     return found
+
+
+def list_children(pid: int) -> list[int]:
+    """Processes that a process has started, by all its threads: each worker is started by one of its own."""
+    threads = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for thread in threads for child in thread.read_text().split()]
