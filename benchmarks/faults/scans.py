@@ -5,7 +5,7 @@
 
 Phantoms: 110 x 104 x 104 voxels of 37 um, filling factor 0.15, a compacted zone of +0.10 below the bead, noise 0.03 a voxel,
 16 bits. chi2 is the mean of ((map - truth) / sigma)^2 over the cells of the zone (true excess above 0.02) outside the guard;
-an honest error bar gives 1. "before" are the figures of labsim before scans were held against themselves (e58927b).
+an honest error bar gives 1. "before" are the figures of labsim before scans were held against themselves.
 Damaged stacks: the shipped scan p01-C01, its slices lost, doubled, swapped or taken from p05-C02. The last column is what labsim
 says beyond what it says of the sound scan: an error or the warnings. "silent" is a failure where the map is not right.
 """

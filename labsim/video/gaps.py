@@ -86,6 +86,10 @@ def find_lost_frames(
     place, lost, moved, begin = found
     better = choose_motion(moved, depth, error, begin)
     chance = OUTLIER**2 + 2.0 * np.log(len(places) * LONGEST_GUESS)
-    if better is None or better.best.judge(1.0) > best.judge(1.0) - chance:
+    if better is None:
+        return None
+    # what is gained counts by the scatter that is left: rows of whole pixels scatter alike with any clock
+    noise = max(1.0, better.best.motion.chi_square / max(better.best.motion.freedom, 1))
+    if better.best.judge(noise) > best.judge(noise) - chance:
         return None
     return place, lost, better
