@@ -3,7 +3,7 @@
 Per radian throughout. A cell of area A and mean corner radius r has the volume r A; with the corner gradients b of its
 area its rate of dilatation is then exactly b·v + (mean of v_r)/r, so that mass is kept to round-off. One point of quadrature
 and viscous hourglass control: Flanagan & Belytschko (1981).
-Law: Güttler et al. (2009), eqs. 3-5; Sirono (2004). Central differences in time. SI.
+Law: Güttler et al. (2009), eqs. 4-6; Sirono (2004). Central differences in time. SI.
 """
 
 from __future__ import annotations
