@@ -237,3 +237,22 @@ def test_slices_that_would_fill_the_memory_are_refused_before_they_are_unpacked(
     if side == 20000:
         with pytest.raises(LabsimError, match="more than"):
             open_frames(tmp_path / "one.tif")
+
+
+def test_a_damaged_hdf5_file_is_one_line(tmp_path):
+    """Bytes of its inner tables changed, one after the other: the stack opens and reads, or the file is named."""
+    sound = write_stack(tmp_path / "sound.h5", np.arange(8 * 16 * 16, dtype=np.uint16).reshape(8, 16, 16))
+    refused = 0
+    for at in range(0, 2048, 5):
+        data = bytearray(sound.read_bytes())
+        data[at] ^= 0xA5
+        file = tmp_path / "damaged.h5"
+        file.write_bytes(data)
+        try:
+            stack = open_stack(file)
+            for k in range(stack.count):
+                stack.slice(k)
+        except MeasurementError as trouble:
+            refused += 1
+            assert "\n" not in str(trouble) and "damaged.h5" in str(trouble)
+    assert refused > 5  # most bytes there are padding

@@ -102,7 +102,7 @@ def test_nothing_is_lost_where_nothing_is_missing() -> None:
 def test_rows_of_whole_pixels_do_not_hide_a_lost_frame(spikes: tuple[int, ...]) -> None:
     """They scatter ten times more than is stated with any clock, so no clock is better than the one that is written."""
     for seed in range(4):
-        rows, depth = fall(seed, 3.0, 26.0, 0.01)
+        rows, _ = fall(seed, 3.0, 26.0, 0.01)
         rows = np.round(rows)
         rows[list(spikes)] += 60.0
         track = make_track(rows, 0.03)

@@ -16,12 +16,19 @@ def recognise(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in SUFFIXES
 
 
+# what h5py says of a file whose inner tables are damaged
+DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError)
+
+
 def open_stack(path: Path) -> SliceStack:
-    """Open the volume of a DXchange file; raises MeasurementError where it holds projections or nothing."""
+    """Open the volume of a DXchange file; raises MeasurementError where it holds projections or nothing, or is damaged."""
     try:
-        file = h5py.File(path, "r")
-    except OSError as trouble:
+        return _open_volume(path, h5py.File(path, "r"))
+    except DAMAGED as trouble:
         raise MeasurementError(path, "scan.slices", f"is not a readable HDF5 file ({trouble})") from None
+
+
+def _open_volume(path: Path, file: h5py.File) -> SliceStack:
     if "exchange/data" not in file:
         raise MeasurementError(path, "exchange/data", "is missing; DXchange keeps the volume there")
     data = file["exchange/data"]
