@@ -240,14 +240,13 @@ def test_slices_that_would_fill_the_memory_are_refused_before_they_are_unpacked(
 
 
 def test_a_damaged_hdf5_file_is_one_line(tmp_path):
-    """Bytes of its inner tables changed, one after the other: the stack opens and reads, or the file is named."""
+    """A byte too many among its inner tables, in one place after the other: the stack reads, or the file is named."""
     sound = write_stack(tmp_path / "sound.h5", np.arange(8 * 16 * 16, dtype=np.uint16).reshape(8, 16, 16))
+    content = sound.read_bytes()
     refused = 0
-    for at in range(0, 2048, 5):
-        data = bytearray(sound.read_bytes())
-        data[at] ^= 0xA5
+    for at in range(0, 2048, 16):
         file = tmp_path / "damaged.h5"
-        file.write_bytes(data)
+        file.write_bytes(content[:at] + b"\x5a" + content[at:])
         try:
             stack = open_stack(file)
             for k in range(stack.count):
@@ -255,4 +254,4 @@ def test_a_damaged_hdf5_file_is_one_line(tmp_path):
         except MeasurementError as trouble:
             refused += 1
             assert "\n" not in str(trouble) and "damaged.h5" in str(trouble)
-    assert refused > 5  # most bytes there are padding
+    assert refused > 20
