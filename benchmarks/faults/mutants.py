@@ -138,7 +138,7 @@ def write_sound(home: Path) -> None:
     import h5py
     import pandas as pd
     import tifffile
-    from campaign_files import SCAN, fill_in
+    from campaign_files import write_scan_of
 
     from labsim.ct.phantom import Phantom
     from labsim.inference.runs import RunStore, require_runs
@@ -177,22 +177,7 @@ def write_sound(home: Path) -> None:
         cv2.imwrite(str(home / f"v/pictures/{k:03d}.png"), picture)
 
     phantom = Phantom(shape=(64, 56, 56), centre=(28.3, 27.6, 26.4), radius=7.5, surface=16.0)
-    record = phantom.write(home / "scan" / "slices")
-    bead, grey = record.projectile, record.calibration
-    (home / "scan/scan.toml").write_text(
-        fill_in(
-            SCAN,
-            radius_mm=bead.tip_radius * 1e3,
-            mass_mg=bead.mass * 1e6,
-            speed_m_s=0.8,
-            speed_sigma_m_s=0.04,
-            voxel_um=record.voxel * 1e6,
-            bits=record.bits,
-            grey_air=grey.grey_air,
-            grey_per_density=grey.grey_per_density,
-            density_solid_kg_m3=grey.density_solid,
-        )
-    )
+    write_scan_of(phantom, home / "scan")
     slices = [tifffile.imread(file) for file in sorted((home / "scan/slices").glob("*.tif"))]
     with h5py.File(home / "stack.h5", "w") as stack:
         stack.create_dataset("exchange/data", data=np.stack(slices), chunks=(1, *slices[0].shape))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from attempts import attempt
-from campaign_files import SCAN, fill_in
+from campaign_files import write_scan_of
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from mutations import change_bytes, change_file, change_json
@@ -90,21 +90,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     campaign = copy_campaign(home / "campaign")
     phantom = Phantom(shape=(64, 56, 56), centre=(28.3, 27.6, 26.4), radius=7.5, surface=16.0)
     scan = campaign / "ct" / "C01"
-    record = phantom.write(scan / "slices")
-    bead, grey = record.projectile, record.calibration
-    text = fill_in(
-        SCAN,
-        radius_mm=bead.tip_radius * 1e3,
-        mass_mg=bead.mass * 1e6,
-        speed_m_s=0.8,
-        speed_sigma_m_s=0.04,
-        voxel_um=record.voxel * 1e6,
-        bits=record.bits,
-        grey_air=grey.grey_air,
-        grey_per_density=grey.grey_per_density,
-        density_solid_kg_m3=grey.density_solid,
-    )
-    (scan / "scan.toml").write_text(text)
+    write_scan_of(phantom, scan)
     (scan / "slices" / "scan_rec.log").write_text(
         "[System]\nScanner=SkyScan1172\n[Acquisition]\nImage Pixel Size (um)=37.0\n[Reconstruction]\n"
         "Pixel Size (um)=37.0\nSections Count=64\nResult Image Width (pixels)=56\nResult Image Height (pixels)=56\n"

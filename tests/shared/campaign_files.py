@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from labsim.ct.phantom import Phantom
+    from labsim.records import Scan
 
 CAMPAIGN = """format = 1
 name = "t"
@@ -75,3 +81,23 @@ def fill_in(text: str, **values: float | str) -> str:
         text, count = re.subn(rf"^{key} = .*$", line, text, flags=re.MULTILINE)
         assert count == 1, key
     return text
+
+
+def write_scan_of(phantom: Phantom, folder: Path) -> Scan:
+    """A scan folder of a phantom: its slices and a scan.toml that states its bead at 0.8 m/s; the scan as it was written."""
+    scan = phantom.write(folder / "slices")
+    bead, grey = scan.projectile, scan.calibration
+    text = fill_in(
+        SCAN,
+        radius_mm=bead.tip_radius * 1e3,
+        mass_mg=bead.mass * 1e6,
+        speed_m_s=0.8,
+        speed_sigma_m_s=0.04,
+        voxel_um=scan.voxel * 1e6,
+        bits=scan.bits,
+        grey_air=grey.grey_air,
+        grey_per_density=grey.grey_per_density,
+        density_solid_kg_m3=grey.density_solid,
+    )
+    (folder / "scan.toml").write_text(text)
+    return scan

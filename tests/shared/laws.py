@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from campaign_files import CAMPAIGN, DROP, SCAN, fill_in
+from campaign_files import CAMPAIGN, DROP, fill_in, write_scan_of
 
 from labsim.ct.phantom import Phantom
 from labsim.inference.runs import RunStore
@@ -139,17 +139,4 @@ def write_scan(folder: Path) -> None:
     depth, _ = move(0.5e-3, 1.33e-6, 0.8, 1300.0)
     plain = Phantom()
     phantom = Phantom(centre=(54.3, 50.6, depth / plain.voxel - plain.radius + plain.surface))
-    scan = phantom.write(folder / "slices")
-    grey = phantom.calibration
-    text = fill_in(
-        SCAN,
-        radius_mm=scan.projectile.tip_radius * 1e3,
-        mass_mg=scan.projectile.mass * 1e6,
-        speed_m_s=0.8,
-        speed_sigma_m_s=0.04,
-        voxel_um=phantom.voxel * 1e6,
-        bits=phantom.bits,
-        grey_air=grey.grey_air,
-        grey_per_density=grey.grey_per_density,
-    )
-    (folder / "scan.toml").write_text(text)
+    write_scan_of(phantom, folder)
