@@ -1,6 +1,6 @@
 """What ``labsim check`` says of a campaign that is readable but wrong: one change a line, with what was said on 2026-11-22.
 
-    python benchmarks/faults/campaigns.py [CAMPAIGN] [--only TEXT] [--drops D05,D06] [--full] [--calibrate] [--keep DIR]
+    python benchmarks/faults/campaigns.py [CAMPAIGN] [--only REGEX] [--drops D05,D06] [--full] [--calibrate] [--keep DIR]
 
 CAMPAIGN (default data/campaigns/p01) gives its drops D05 and D06; each change is made to a copy of the two (those with
 "other" in their name: to D06 of the whole campaign), ``labsim check`` runs on the copy in this process, and what it says
@@ -99,8 +99,8 @@ def lose(first: int, count: int, *, renumber: bool) -> RowChange:
 
 def repeat(frame: np.ndarray, row: np.ndarray, contact: int) -> Rows:
     at = contact + 6
-    new = np.insert(row, at, [row[at]] * 3)
-    return frame[0] + np.arange(new.size), new
+    number = np.concatenate([frame[:at], frame[at] + np.arange(3), frame[at:] + 3])
+    return number, np.insert(row, at, [row[at]] * 3)
 
 
 def jump(after_contact: int | None, size: float = 5.0) -> RowChange:
@@ -310,13 +310,13 @@ def calibrate(folder: Path, out: Path) -> str:
     found = json.loads(said)
     p_m = found["p_m_Pa"]
     warned = "".join(f"\n      warned: {text}" for text in found["warnings"])
-    return f"calibrate: p_m {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa, p {found.get('p_value')}{warned}"
+    return f"calibrate: p_m {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa, p {found['p_value']:.2g}{warned}"
 
 
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("campaign", nargs="?", type=Path, default=ROOT / "data/campaigns/p01")
-    parser.add_argument("--only", default="", help="changes with this in their name")
+    parser.add_argument("--only", default="", help="changes whose name this regular expression finds")
     parser.add_argument("--drops", default="D05,D06")
     parser.add_argument("--full", action="store_true", help="all drops of the campaign in every change")
     parser.add_argument("--calibrate", action="store_true")
@@ -329,7 +329,7 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as made:
         place = given.keep or Path(made)
         for number, (name, (change, before)) in enumerate(CHANGES.items()):
-            if given.only not in name:
+            if not re.search(given.only, name):
                 continue
             folder = place / f"{number:02d}-{re.sub(r'[^a-z0-9]+', '-', name)}"
             whole = given.full or name.startswith("other")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ def write_files(folder: Path, tracked: Tracked) -> list[str]:
 
     video.write_track(found, folder / "track.csv")
     written = ["track.csv"]
+    if curve is not None and curve.clock is not None:
+        found = replace(found, time=curve.clock)  # pictures show the rows where the fit took them
     title = f"{request.drop.name if request.drop else request.source.name}"
     if curve is not None:
         camera = make_camera(request, found)

@@ -29,8 +29,8 @@ def doubt_surface_row(drop: Drop, track: Track, curve: DecelerationCurve) -> str
     fault, and would move the contact. Nothing is said where it is off by more than SCALE_LIMIT.
     """
     camera = drop.camera
-    assert camera is not None
-    if (track.time[track.valid] < curve.contact_time.value).sum() < LEAST_FREE:
+    assert camera is not None and curve.clock is not None
+    if (curve.clock[track.valid] < curve.contact_time.value).sum() < LEAST_FREE:
         return None
     scaled = camera
     if curve.apparent_gravity is not None:

@@ -88,7 +88,8 @@ def _describe(drop: Drop, size: str, track: Track, curve: DecelerationCurve) -> 
 
 def _judge_fall(drop: Drop, track: Track, curve: DecelerationCurve, found: Found) -> None:
     """Free fall above the surface: enough frames, and gravity and speed as they should be."""
-    free = int((track.time[track.valid] < curve.contact_time.value).sum())
+    clock = track.time if curve.clock is None else curve.clock
+    free = int((clock[track.valid] < curve.contact_time.value).sum())
     if free < LEAST_FRAMES:
         found.odd.append(
             f"only {free} frames before contact; the speed at contact needs free fall above the surface"

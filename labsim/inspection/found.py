@@ -31,15 +31,3 @@ class Found:
 def is_odd(ratio: Measured) -> bool:
     """Whether a ratio that should be one is not."""
     return abs(ratio.value - 1) > max(ODD * ratio.sigma, SMALL_SHARE)
-
-
-def list_numbers(numbers: list[int], most: int = 8) -> str:
-    """3, 7-12, 40 … for people."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][1] + 1:
-            runs[-1][1] = number
-        else:
-            runs.append([number, number])
-    shown = ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in runs[:most])
-    return shown + (" …" if len(runs) > most else "")

@@ -1,8 +1,8 @@
-"""What the rows of one track contradict: frames that are missing, left out, doubled, or after a jump.
+"""What the rows of one track contradict: frames that are missing, left out, or after a jump.
 
 Rows follow one motion: free fall, a deceleration, rest or a small rebound. They cannot jump (a projectile has no infinite
-speed) and not agree to the last digit while it moves (noise does not repeat). The curve's fit says which frames it stands on,
-and finds frames that were lost and second impacts by itself (``labsim.video.curve``); here the rows are looked at beside it.
+speed). The curve's fit says which frames it stands on, and finds doubled pictures, frames that were lost and second impacts by
+itself (``labsim.video.curve``); here the rows are looked at on its clock, so that none of them is found again as another fault.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ..records import DecelerationCurve, FloatArray, Track
+from ..video.gaps import find_repeats, list_numbers
 from ..video.track_file import measure_scatter
-from .found import list_numbers
 
 CONSECUTIVE = 3  # frames in a row that are worth a word
 MANY_LEFT_OUT = 0.05  # of the fitted frames; honest tracks have one spike in a hundred frames
@@ -26,22 +26,16 @@ MEDIAN = 7  # frames of the running median: spikes of three frames and less are 
 def judge_frames(track: Track, curve: DecelerationCurve) -> list[str]:
     """What is odd in the frames of a track, one line each."""
     assert curve.used is not None and curve.residual is not None
-    good = track.valid & np.isfinite(track.tip_row)
-    clock = (track.time if curve.clock is None else curve.clock)[good]
-    frame, row = track.frame[good], track.tip_row[good]
+    clock = track.time if curve.clock is None else curve.clock
+    good = np.flatnonzero(track.valid & np.isfinite(track.tip_row))
+    said = _judge_gaps(track.frame[good], clock[good], curve) + _judge_left_out(track, curve)
+    good = good[~find_repeats(track.frame[good], track.tip_row[good], track.sigma[good])]
+    frame, time, row = track.frame[good], clock[good], track.tip_row[good]
     noise = float(np.median(track.sigma[good]))
-    if np.isfinite(scatter := measure_scatter(clock, row)):
+    if np.isfinite(scatter := measure_scatter(time, row)):
         noise = max(noise, scatter)  # whole pixels, say
-    repeats = _find_repeats(frame, row, noise)
-    said = _judge_gaps(frame, clock, curve) + _judge_left_out(track, curve)
-    if repeats.size:
-        numbers = [int(number) for number in frame[repeats + 1]]
-        said.append(
-            f"frame{'s' * (len(numbers) > 1)} {list_numbers(numbers)} repeat{'s' * (len(numbers) == 1)} the row before to "
-            "the last digit while the projectile moves: pictures were doubled, and time is counted wrong from there"
-        )
-    keep = ~_find_spikes(row, curve.residual[good], noise) & (clock <= clock[curve.used[good]].max())
-    return said + _judge_jumps(frame[keep], clock[keep], row[keep], noise, curve, frame[repeats])
+    keep = ~_find_spikes(row, curve.residual[good], noise) & (time <= time[curve.used[good]].max())
+    return said + _judge_jumps(frame[keep], time[keep], row[keep], noise, curve)
 
 
 def count_missing(track: Track) -> int:
@@ -94,16 +88,6 @@ def _judge_left_out(track: Track, curve: DecelerationCurve) -> list[str]:
     ]
 
 
-def _find_repeats(frame: np.ndarray, row: FloatArray, noise: float) -> np.ndarray:
-    """Places of rows that the next one repeats to the last digit while the projectile moves."""
-    step = np.abs(np.diff(row))
-    if step.size < 2 * SIDE:
-        return np.empty(0, int)
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(step, SIDE, mode="edge"), 2 * SIDE + 1)
-    around = np.quantile(windows, 0.3, axis=1)  # a few repeats do not hide the motion
-    return np.flatnonzero((step == 0) & (np.diff(frame) == 1) & (around > max(CLEAR * noise, LEAST_JUMP)))
-
-
 def _find_spikes(row: FloatArray, residual: FloatArray, noise: float) -> np.ndarray:
     """Rows far from the running median of the fit's residuals, (n,) bool; the two sides of a jump are none.
 
@@ -125,17 +109,14 @@ def _judge_jumps(
     row: FloatArray,
     noise: float,
     curve: DecelerationCurve,
-    known: np.ndarray,
 ) -> list[str]:
-    """Steps of the row that no smooth motion makes, the clearest of each place, but for frames where they are known."""
+    """Steps of the row that no smooth motion makes, the clearest of each place."""
     if row.size < 2 * SIDE + 4:
         return []
     tick = float(np.median(np.diff(clock) / np.diff(frame)))
     jumps, clear = _measure_jumps(
         clock / tick, row, noise, curve.contact_time.value / tick, _find_stop(curve) / tick
     )
-    for number in known:
-        clear[np.abs(frame[:-1] - number) <= 2 * SIDE] = 0.0
     said: list[str] = []
     while clear.max() > CLEAR and len(said) < 3:
         k = int(np.argmax(clear))

@@ -94,14 +94,14 @@ def _take_rows(track: Track, camera: Camera, tip_radius: float) -> _Rows | None:
         curve = fit_deceleration(track, camera)
     except MeasurementError:
         return None
-    assert curve.used is not None
+    assert curve.used is not None and curve.clock is not None
     stop = curve.contact_time.value + curve.stopping_time.value
-    use = curve.used & ~(track.time > stop)  # every used frame where the record ends before the stop
+    use = curve.used & ~(curve.clock > stop)  # every used frame where the record ends before the stop
     if np.sum(use) < 12:
         return None
     pixel = camera.pixel_size
     return _Rows(
-        track.time[use], track.tip_row[use], track.sigma[use], tip_radius / pixel, STANDARD_GRAVITY / pixel
+        curve.clock[use], track.tip_row[use], track.sigma[use], tip_radius / pixel, STANDARD_GRAVITY / pixel
     )
 
 

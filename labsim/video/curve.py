@@ -11,13 +11,14 @@ from ..errors import MeasurementError
 from ..records import STANDARD_GRAVITY, Camera, DecelerationCurve, FloatArray, Measured, Track
 from .checks import find_second_impact, fit_gravity, measure_alikeness
 from .choosing import Choice, choose_motion, guess_ends
-from .gaps import find_lost_frames
-from .outliers import follow_median
+from .gaps import describe_moves, find_lost_frames, find_repeats, list_numbers, propose_moves
+from .outliers import OUTLIER, follow_median
 from .segments import Motion
 from .variable_projection import fit_motion
 
 AFTER_STOP = 0.5  # share of the stopping time that is fitted beyond the stop
 WIDENINGS = 4  # times that the end of what is fitted is moved on where the stop lies beyond the first guess
+LEAST_FRAMES = 12  # with a position
 LEAST_AFTER = 12.5  # frames that are, at least: dust that springs back pushes for some frames more
 
 
@@ -27,7 +28,8 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     Models of every degree that end in rest, in a rebound or in the open are weighed by the data (Schwarz's criterion); all
     figures are means over them, and what the models disagree is in the sigmas. A frame is an outlier where the fitted motion
     cannot explain it (5 robust standard deviations); every frame is judged anew after each fit, and ``used`` says which are
-    in. Frames that the clock hides are found by the motion: ``clock`` holds the times that the fit took. Sigmas also hold the
+    in. Pictures that were doubled are left out, and frames that the clock hides are found by the motion: of the clocks that the
+    rows suggest the one is taken with which one motion explains them best, and ``clock`` holds its times. Sigmas also hold the
     noise of the rows (raised where the fit scatters more than the error bars say, and where neighbouring frames err alike),
     the uncertainty of the surface row, and of the pixel size where ``camera`` gives one; not of the frame rate. ``name``
     stands in messages.
@@ -35,12 +37,46 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     Raises MeasurementError where there are too few frames or the surface is never reached. Where the record ends
     before the projectile does, depth and stopping time are NaN and a warning says so.
     """
+    seen = np.flatnonzero(track.valid & np.isfinite(track.tip_row) & np.isfinite(track.time))
+    if len(seen) < LEAST_FRAMES:
+        few = f"only {len(seen)} trusted frame{'s' * (len(seen) != 1)}; a curve needs at least {LEAST_FRAMES}"
+        raise MeasurementError(name, "tip_row_px", few)
+    frame, time, row, sigma = (each[seen] for each in (track.frame, track.time, track.tip_row, track.sigma))
+    repeated = find_repeats(frame, row, sigma)
+    valid = track.valid.copy()
+    valid[seen[repeated]] = False
+    track = replace(track, valid=valid)
+    clocks = [
+        (moved, _move(track, seen, moved)) for moved in propose_moves(frame, time, row, sigma, repeated)
+    ]
+    if len(clocks) > 1:
+        clocks.sort(key=lambda clock: _judge_clock(clock[1], camera))
+    moved, track = clocks[0]
+    said = describe_moves(frame, moved / float(np.median(np.diff(time))), repeated)
+    return _fit_clock(replace(track, warnings=(*track.warnings, *said)), camera, name)
+
+
+def _move(track: Track, seen: np.ndarray, moved: FloatArray) -> Track:
+    """The track with the times of the frames ``seen``, and of those after each, moved by ``moved`` (s)."""
+    before = np.clip(np.searchsorted(seen, np.arange(track.time.size), side="right") - 1, 0, None)
+    return replace(track, time=track.time + moved[before])
+
+
+def _judge_clock(track: Track, camera: Camera) -> float:
+    """Mean square of what a motion leaves of the rows in units of the error bars, an outlier's counted as OUTLIER²."""
+    try:
+        curve = _fit_clock(track, camera, "track", search=False)
+    except MeasurementError:
+        return np.inf
+    assert curve.residual is not None
+    left = (curve.residual / track.sigma)[np.isfinite(curve.residual)]
+    return float(np.mean(np.minimum(left**2, OUTLIER**2)))
+
+
+def _fit_clock(track: Track, camera: Camera, name: object, *, search: bool = True) -> DecelerationCurve:
+    """The same for one clock; ``search``: where rows ask for it, for frames lost while the projectile is slowed."""
     warnings = list(track.warnings)
     trusted = np.flatnonzero(track.valid & np.isfinite(track.tip_row) & np.isfinite(track.time))
-    if len(trusted) < 12:
-        raise MeasurementError(
-            name, "tip_row_px", f"only {len(trusted)} trusted frames; a curve needs at least 12"
-        )
     time, row, sigma = track.time[trusted], track.tip_row[trusted], track.sigma[trusted]
     depth = (row - camera.surface_row) * camera.pixel_size
     error = sigma * camera.pixel_size
@@ -73,25 +109,21 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
             "no motion of free flight and deceleration fits; look at the rows against the time",
         )
     clock = track.time.copy()
-    gap = find_lost_frames(time[window], depth[window], error[window], start, choice)
+    gap = find_lost_frames(time[window], depth[window], error[window], start, choice) if search else None
     if gap is not None:
         place, lost, choice = gap
         clock[trusted[place] :] += lost * spacing
         time = clock[trusted]
-        warnings.append(
-            f"{lost} frame{'s are' if lost > 1 else ' is'} missing before frame {track.frame[trusted[place]]}, though the frame "
-            "numbers go on (rows before and after disagree with one clock): later times were moved"
-        )
+        step = np.where(np.arange(len(trusted)) >= place, lost, 0)
+        warnings += describe_moves(track.frame[trusted], step, np.zeros(len(trusted), bool))
     motion = choice.best.motion
     use = np.zeros(len(time), bool)
     use[window] = choice.best.used
     outliers = np.flatnonzero(window & ~use)
     if outliers.size:
-        frames = ", ".join(str(f) for f in track.frame[trusted][outliers][:8])
         many = "s" if outliers.size > 1 else ""
-        warnings.append(
-            f"{outliers.size} outlier{many} left out (frame{many} {frames}{' …' if outliers.size > 8 else ''})"
-        )
+        frames = list_numbers([int(number) for number in track.frame[trusted][outliers]])
+        warnings.append(f"{outliers.size} outlier{many} left out (frame{many} {frames})")
     scale = motion.chi_square / max(motion.freedom, 1)
     if scale > 1.0 + 3.0 * np.sqrt(2.0 / max(motion.freedom, 1)):
         warnings.append(
