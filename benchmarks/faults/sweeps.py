@@ -33,30 +33,7 @@ COMMAND = (
 ).split()
 # status 0: the sweep was through before the fault came
 EXPECTED = {"full": {2}, "worker": {0, 2}, "interrupt": {0, 130}, "term": {0, 143}}
-SMALL = """
-import os, signal, sys, threading
-from concurrent.futures import FIRST_COMPLETED, wait
-from labsim.inference.workers import open_executor
-
-def make(number, deadly, delay):
-    if number == deadly:
-        threading.Timer(delay, os.kill, (os.getpid(), signal.SIGKILL)).start()
-    return bytes(100_000)
-
-if __name__ == "__main__":
-    stop, deadly, delay = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
-    with open_executor(2, None, 400, compile_first=False) as (executor, slots):
-        running = {executor.submit(make, number, deadly, delay) for number in range(400)}
-        print("begun", flush=True)
-        seen = 0
-        while running:
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                future.result()
-                seen += 1
-                if seen == stop:
-                    raise OSError("stopped")
-"""
+SMALL = ROOT / "tests/shared/small_sweep.py"
 
 
 def start(arguments: list[str], **how: object) -> subprocess.Popen[str]:
@@ -95,12 +72,11 @@ def list_workers(pid: int) -> list[int]:
     return found
 
 
-def try_small(kind: str, chance: random.Random, folder: Path) -> tuple[str, float]:
-    script = folder / "small.py"
-    script.write_text(SMALL)
+def try_small(kind: str, chance: random.Random, _folder: Path) -> tuple[str, float]:
     stop = chance.randrange(1, 300) if kind == "raise" else 10_000
     deadly = chance.randrange(300) if kind != "raise" else -1
-    process = start([str(script), str(stop), str(deadly), str(chance.uniform(0.0, 2e-3))])
+    arguments = (400, 100_000, stop, deadly, chance.uniform(0.0, 2e-3))
+    process = start([str(SMALL), *map(str, arguments)])
     assert process.stdout is not None
     process.stdout.readline()
     found = end(process)

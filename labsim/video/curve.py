@@ -41,7 +41,8 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     if len(seen) < LEAST_FRAMES:
         few = f"only {len(seen)} trusted frame{'s' * (len(seen) != 1)}; a curve needs at least {LEAST_FRAMES}"
         raise MeasurementError(name, "tip_row_px", few)
-    frame, time, row, sigma = (each[seen] for each in (track.frame, track.time, track.tip_row, track.sigma))
+    frame, time = track.frame[seen], track.time[seen]
+    row, sigma = track.tip_row[seen], track.sigma[seen]
     repeated = find_repeats(frame, row, sigma)
     valid = track.valid.copy()
     valid[seen[repeated]] = False

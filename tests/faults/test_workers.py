@@ -11,6 +11,7 @@ from concurrent.futures import BrokenExecutor, wait
 from pathlib import Path
 
 import pytest
+import small_sweep
 from attempts import list_children
 from small_campaign import ROOT
 
@@ -18,41 +19,12 @@ from labsim.inference.processes import ProcessWorkers
 
 LONG = 1 << 20  # bytes of a result, many buffers of a pipe
 
-SWEEP = """
-import os, signal, sys, time
-from concurrent.futures import FIRST_COMPLETED, wait
-from labsim.inference.workers import open_executor
 
-def make(size, number, deadly):
-    if number == deadly:  # dies within its own result
-        import threading
-        threading.Timer({delay}, os.kill, (os.getpid(), signal.SIGKILL)).start()
-    return bytes(size)
-
-if __name__ == "__main__":
-    with open_executor(2, None, 50, compile_first=False) as (executor, slots):
-        running = {{executor.submit(make, {size}, k, {deadly}) for k in range(50)}}
-        seen = 0
-        while running:
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                future.result()
-                seen += 1
-                if seen == {stop}:
-                    raise OSError(28, "No space left on device")
-    print("done")
-"""
-
-
-def run_sweep(
-    tmp_path: Path, *, stop: int = -1, deadly: int = -1, delay: float = 0.0
-) -> tuple[int, str, float]:
+def run_sweep(*, stop: int = -1, deadly: int = -1, delay: float = 0.0) -> tuple[int, str, float]:
     """Exit status, what was said, and seconds."""
-    script = tmp_path / "sweep.py"
-    script.write_text(SWEEP.format(size=LONG, stop=stop, deadly=deadly, delay=delay))
     began = time.monotonic()
     done = subprocess.run(
-        [sys.executable, str(script)],
+        [sys.executable, small_sweep.__file__, *map(str, (50, LONG, stop, deadly, delay))],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
@@ -63,15 +35,15 @@ def run_sweep(
 
 
 @pytest.mark.parametrize("stop", [1, 2, 3, 5, 8])
-def test_an_error_within_a_sweep_ends_the_process(tmp_path: Path, stop: int) -> None:
+def test_an_error_within_a_sweep_ends_the_process(stop: int) -> None:
     """While the next results are under way, each of 1 MB."""
-    status, said, seconds = run_sweep(tmp_path, stop=stop)
+    status, said, seconds = run_sweep(stop=stop)
     assert status == 1 and "No space left" in said and seconds < 10.0
 
 
 @pytest.mark.parametrize("delay", [0.0, 1e-4, 3e-4, 1e-3])
-def test_a_worker_killed_within_its_result_ends_the_sweep(tmp_path: Path, delay: float) -> None:
-    status, said, seconds = run_sweep(tmp_path, deadly=7, delay=delay)
+def test_a_worker_killed_within_its_result_ends_the_sweep(delay: float) -> None:
+    status, said, seconds = run_sweep(deadly=7, delay=delay)
     assert seconds < 10.0
     assert status == 0 or "killed by SIGKILL" in said, said  # 0: the last one that it had to do was through
 
