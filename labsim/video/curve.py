@@ -51,7 +51,8 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
         (moved, _move(track, seen, moved)) for moved in propose_moves(frame, time, row, sigma, repeated)
     ]
     if len(clocks) > 1:
-        clocks.sort(key=lambda clock: _judge_clock(clock[1], camera))
+        # a clock moved for nothing has to gain what an outlier costs
+        clocks.sort(key=lambda clock: _judge_clock(clock[1], camera) + clock[0].any() * OUTLIER**2 / len(seen))
     moved, track = clocks[0]
     said = describe_moves(frame, moved / float(np.median(np.diff(time))), repeated)
     return _fit_clock(replace(track, warnings=(*track.warnings, *said)), camera, name)
