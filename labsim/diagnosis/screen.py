@@ -2,16 +2,19 @@
 
 Input: a Workbench and the nominal Fit. Output: a Screening with, for every effect, how far its fingerprint (the tangent after
 ln p_m and all nuisances are taken out) lies along the residual, what amplitude that asks for, and how alike the
-fingerprints are. Formulas: docs/diagnosis.md; Rao's score test, linear Gaussian Bayes factor.
+fingerprints are. Formulas: docs/diagnosis.md; Rao's score test, linear Gaussian Bayes factor, where ln p_m ends with its range
+and amplitudes with their limits.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..inference.evidence import integrate_linear, log_share_inside
 from ..inference.fitting import Fit, with_probes
 from ..inference.nodes import amplitude_nodes, screening_node
 from ..inference.workbench import Workbench
@@ -37,7 +40,11 @@ class Score:
 @dataclass(frozen=True)
 class Screening:
     """scores, best first; cosines : (k, k) between fingerprints in the order of ``names``; p_value of the largest score;
-    residual, fingerprints : whitened, projected."""
+    residual, fingerprints : whitened, projected.
+
+    log_p_m : of the fit; step : how far the data want it from there, were it free, with standard deviation sigma; traded : (k,)
+    of that step, per unit of each amplitude.
+    """
 
     scores: list[Score]
     names: list[str]
@@ -45,6 +52,10 @@ class Screening:
     p_value: float
     residual: FloatArray
     fingerprints: FloatArray
+    log_p_m: float
+    step: float
+    sigma: float
+    traded: FloatArray
 
 
 def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str] | None = None) -> Screening:
@@ -68,46 +79,78 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
             for block in linear.blocks
         ]
     )
-    direction = whitened[:, 1] / np.linalg.norm(whitened[:, 1])
-    projected = whitened - np.outer(direction, direction @ whitened)
-    residual, fingerprints = projected[:, 0], projected[:, 2:]
+    sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))
+    direction = whitened[:, 1] * sigma
+    along = direction @ whitened
+    projected = whitened - np.outer(direction, along)
+    residual, fingerprints, traded = projected[:, 0], projected[:, 2:], sigma * along[2:]
     lengths = np.linalg.norm(fingerprints, axis=0)
     usable = lengths > 1e-9
     names = [name for name, ok in zip(names, usable, strict=True) if ok]
-    fingerprints, lengths = fingerprints[:, usable], lengths[usable]
+    fingerprints, lengths, traded = fingerprints[:, usable], lengths[usable], traded[usable]
     unit = fingerprints / lengths
     z = unit.T @ residual
-    scores = []
-    for k, name in enumerate(names):
-        width = bench.effects[name].amplitudes[0].scale
-        snr = (lengths[k] * width) ** 2
-        log_bayes = 0.5 * z[k] ** 2 * snr / (1 + snr) - 0.5 * math.log1p(snr)
-        log_bayes += bench.shape_evidence.get(name, 0.0)
-        scores.append(Score(name, float(z[k]), float(lengths[k]), float(z[k] / lengths[k]), float(log_bayes)))
     cosines = unit.T @ unit
     largest = float(np.max(z**2)) if len(z) else 0.0
     root = np.linalg.cholesky(cosines + 1e-9 * np.eye(len(z)))
     null = np.max((rng.standard_normal((DRAWS, len(z))) @ root.T) ** 2, axis=1)
     p_value = float((np.sum(null >= largest) + 1) / (DRAWS + 1))
-    scores.sort(key=lambda score: -score.log_bayes)
-    return Screening(scores, names, cosines, p_value, residual, fingerprints)
+    found = Screening(
+        [],
+        names,
+        cosines,
+        p_value,
+        residual,
+        fingerprints,
+        fit.log_p_m,
+        sigma * float(along[0]),
+        sigma,
+        traded,
+    )
+    scores = []
+    for k, name in enumerate(names):
+        log_bayes = compare_linear(bench, found, [k]) + bench.shape_evidence.get(name, 0.0)
+        scores.append(Score(name, float(z[k]), float(lengths[k]), float(z[k] / lengths[k]), log_bayes))
+    return replace(found, scores=sorted(scores, key=lambda score: -score.log_bayes))
+
+
+def compare_linear(bench: Workbench, screening: Screening, chosen: Sequence[int]) -> float:
+    """ln Bayes factor of the chosen effects, by their places in ``names``, against the nominal model, all of them linear.
+
+    Both are integrated over ln p_m inside its range and over amplitudes inside their limits: a nominal fit that its range stops
+    is as bad as it is there, and what asks for an amplitude that cannot be explains nothing.
+    """
+    place = list(chosen)
+    parameters = [bench.effects[screening.names[k]].amplitudes[0] for k in place]
+    limits = [
+        ((each.limits[0] - each.null) / each.scale, (each.limits[1] - each.null) / each.scale)
+        for each in parameters
+    ]
+    low, high = (math.log(p) - screening.log_p_m for p in bench.campaign.p_m_range)
+    widths = [each.scale for each in parameters]
+    # data, ln p_m, amplitudes in units of their priors; the first row is all that lies along the tangent of ln p_m
+    along = np.concatenate([[screening.step, 1.0], screening.traded[place] * widths]) / screening.sigma
+    beside = [
+        screening.residual,
+        np.zeros(len(screening.residual)),
+        screening.fingerprints[:, place] * widths,
+    ]
+    rows = np.vstack([along, np.column_stack(beside)])
+    nominal = integrate_linear(rows[:, 1:2], rows[:, 0], [(low, high)])
+    priors = np.eye(2 + len(place))[2:]
+    rows = np.vstack([rows, priors])
+    extended = integrate_linear(rows[:, 1:], rows[:, 0], [(low, high), *limits])
+    cut = sum(log_share_inside(*between, 0.0, 1.0) for between in limits)  # of the priors
+    return extended - nominal - cut - 0.5 * len(place) * math.log(2 * math.pi)
 
 
 def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str, str], float]]:
     """ln Bayes factors of all pairs against the nominal model, linear, best first."""
-    widths = np.array([bench.effects[name].amplitudes[0].scale for name in screening.names])
-    columns = screening.fingerprints * widths
-    gram, towards = columns.T @ columns, columns.T @ screening.residual
-    found = []
-    for i, first in enumerate(screening.names):
-        for j in range(i + 1, len(screening.names)):
-            own = np.ix_((i, j), (i, j))
-            information = gram[own] + np.eye(2)
-            pull = towards[[i, j]]
-            log_bayes = (
-                0.5 * pull @ np.linalg.solve(information, pull) - 0.5 * np.linalg.slogdet(information)[1]
-            )
-            found.append(((first, screening.names[j]), float(log_bayes)))
+    found = [
+        ((first, screening.names[j]), compare_linear(bench, screening, (i, j)))
+        for i, first in enumerate(screening.names)
+        for j in range(i + 1, len(screening.names))
+    ]
     return sorted(found, key=lambda item: -item[1])
 
 

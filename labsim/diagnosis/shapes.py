@@ -139,6 +139,7 @@ def merge_variants(
         names=[chosen[screening.names[k]][0] for k in positions],
         cosines=screening.cosines[np.ix_(positions, positions)],
         fingerprints=screening.fingerprints[:, positions],
+        traded=screening.traded[positions],
     )
 
 

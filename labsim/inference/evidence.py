@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
+from ..records import FloatArray
 from .steps import Solved, stop_at_limits
 from .workbench import Workbench
 
@@ -42,3 +45,25 @@ def log_share_inside(low: float, high: float, mean: float, sigma: float) -> floa
     if below > 0.0:  # the other tail, where shares do not round to 1
         below, above = -above, -below
     return float(log_ndtr(above) + math.log1p(-min(math.exp(log_ndtr(below) - log_ndtr(above)), MOST_CUT)))
+
+
+def integrate_linear(design: FloatArray, data: FloatArray, limits: Sequence[tuple[float, float]]) -> float:
+    """ln of the integral of exp(-χ²/2), χ² = |data - design x|², over x between limits, about its top there.
+
+    What a limit stops falls off from it, the others at their best with it; exact where one limit cuts alone.
+    """
+    low, high = np.transpose(limits)
+    found = lsq_linear(design, data, (low, high), method="bvls")
+    top, held = found.x, found.active_mask != 0
+    left = data - design @ top
+    information, gradient = design.T @ design, design.T @ left
+    covariance = np.linalg.inv(information[np.ix_(~held, ~held)])
+    across = information[np.ix_(held, ~held)]
+    precision = np.diag(information[np.ix_(held, held)] - across @ covariance @ across.T)
+    sigma, mean = np.zeros(len(top)), np.zeros(len(top))
+    sigma[~held] = np.sqrt(np.diag(covariance))
+    sigma[held] = 1.0 / np.sqrt(precision)
+    mean[held] = gradient[held] / precision
+    total = 0.5 * (np.linalg.slogdet(covariance)[1] - np.sum(np.log(precision)) - left @ left)
+    total += 0.5 * len(top) * math.log(2 * math.pi) + 0.5 * np.sum((mean / sigma) ** 2)
+    return float(total + sum(map(log_share_inside, low - top, high - top, mean, sigma)))
