@@ -1,16 +1,18 @@
 """How strong a hidden effect is: what the best nominal fit leaves of it, in standard deviations.
 
 The hidden campaign is filmed without any noise and fitted by the nominal model as every campaign is: p_m, contacts, speeds and
-all other nuisances move as far as they can. χ² (of the residuals whitened by the covariance of that fit, so twice the loss of log
-likelihood) beyond what the nominal truth leaves, which differs from the model in its spacing, is the square of the strength. It
-is by this number that χ² of a noisy campaign is larger on average.
+all other nuisances move as far as they can, p_m ROOM beyond its range too. Where the range stopped it, what is left would say
+that the dust is stiffer or softer than stated, which all causes that p_m can make up for do alike, and nothing of this one.
+χ² (of the residuals whitened by the covariance of that fit, so twice the loss of log likelihood) beyond what the nominal truth
+leaves, which differs from the model in its spacing, is the square of the strength. It is by this number that χ² of a noisy
+campaign is larger on average.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from .runs import RunStore
 from .synthetic import QUIET, measure_hidden
 from .truth import Hidden, TruthTable
 
+ROOM = 10.0  # factor on both ends of the stated range of p_m, for the fit that strengths are counted by
 RATIO = 2.0  # of amplitudes simulated, powers of it times the effect's step
 STRIDE = 4.0  # at once, at most
 MOST_NODES = 5  # amplitudes simulated on one side of null
@@ -55,7 +58,9 @@ class StrengthCount:
 
     def _leave(self, hidden: Hidden) -> float:
         measurements = measure_hidden(self.truth, hidden, np.random.default_rng(0), laboratory=QUIET)
-        _, fit = prepare(self.campaign, self.store, workers=1, measurements=measurements)
+        low, high = self.campaign.p_m_range
+        free = replace(self.campaign, p_m_range=(low / ROOM, high * ROOM))
+        _, fit = prepare(free, self.store, workers=1, measurements=measurements)
         return fit.chi_square
 
     def simulate(self, effect: Effect, amplitude: float) -> float:

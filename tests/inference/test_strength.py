@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
+from labsim.inference import strength
 from labsim.inference.runs import RunStore
 from labsim.inference.strength import StrengthCount, hide
 from labsim.inference.synthetic import QUIET, measure_hidden
@@ -82,3 +83,13 @@ def test_what_does_not_follow_its_amplitude_is_not_found(count):
     assert uneven._search(effect, {0.2: 2.0, 0.8: 8.0}, 4.0) is None
     uneven.simulate = lambda effect, amplitude: 10.0 * amplitude
     assert uneven._search(effect, {0.2: 2.0, 0.8: 8.0}, 4.0).strength == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("room", "stopped"), [(strength.ROOM, False), (1.0, True)])
+def test_dust_softer_than_the_range_says_is_not_counted(count, monkeypatch, room, stopped):
+    """What p_m makes up for leaves nothing, wherever its stated range ends; within the range alone it would."""
+    monkeypatch.setattr(strength, "ROOM", room)
+    narrow = StrengthCount(
+        replace(count.campaign, p_m_range=(1600.0, 6000.0)), count.store, count.truth, reference=0.0
+    )
+    assert (narrow.measure(Hidden()) > 5.0) == stopped
