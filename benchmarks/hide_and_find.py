@@ -122,8 +122,11 @@ def find_either(count: StrengthCount, name: str, sigma: float, side: int) -> Fou
 
 def draw_single(rng: np.random.Generator, catalogue: Catalogue, count: StrengthCount, kind: str) -> Plan:
     """An effect of this kind that can be as strong as wanted."""
-    for name in rng.permutation([name for name in catalogue.names if catalogue.kinds[name] == kind]):
-        found = find_either(count, str(name), *draw_side(rng))
+    names = rng.permutation([name for name in catalogue.names if catalogue.kinds[name] == kind])
+    drawn = [(str(name), *draw_side(rng)) for name in names]
+    least = [(name, SIGMAS[0], side) for name, _, side in drawn]  # where limits allow no more
+    for name, sigma, side in drawn + least:
+        found = find_either(count, name, sigma, side)
         if found is not None:
             return Plan(kind, found.hidden, found.strength)
     raise SystemExit(f"error: {kind}: no effect reaches {SIGMAS[0]:.0f} sigma within its limits")

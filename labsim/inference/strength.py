@@ -24,7 +24,8 @@ from .runs import RunStore
 from .synthetic import QUIET, measure_hidden
 from .truth import Hidden, TruthTable
 
-ROOM = 10.0  # factor on both ends of the stated range of p_m, for the fit that strengths are counted by
+ROOM = 2.0  # factor on both ends of the stated range of p_m, for the fit that strengths are counted by: more costs runs
+# in dust that no laboratory has, and few effects that p_m makes up for so well reach any strength at all
 RATIO = 2.0  # of amplitudes simulated, powers of it times the effect's step
 STRIDE = 4.0  # at once, at most
 MOST_NODES = 5  # amplitudes simulated on one side of null
