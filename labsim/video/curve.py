@@ -52,7 +52,9 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     ]
     if len(clocks) > 1:
         # a clock moved for nothing has to gain what an outlier costs
-        clocks.sort(key=lambda clock: _judge_clock(clock[1], camera) + clock[0].any() * OUTLIER**2 / len(seen))
+        clocks.sort(
+            key=lambda clock: _judge_clock(clock[1], camera) + clock[0].any() * OUTLIER**2 / len(seen)
+        )
     moved, track = clocks[0]
     said = describe_moves(frame, moved / float(np.median(np.diff(time))), repeated)
     return _fit_clock(replace(track, warnings=(*track.warnings, *said)), camera, name)
