@@ -1,8 +1,8 @@
 """How strong a hidden effect is: what the best nominal fit leaves of it, in standard deviations.
 
 The hidden campaign is filmed without any noise and fitted by the nominal model as every campaign is: p_m, contacts, speeds and
-all other nuisances move as far as they can, p_m ROOM beyond its range too. Where the range stopped it, what is left would say
-that the dust is stiffer or softer than stated, which all causes that p_m can make up for do alike, and nothing of this one.
+all other nuisances move as far as they can, p_m a factor ROOM beyond its range too. If the range stopped it, the strength would
+also count that the dust is stiffer or softer than stated, and that tells nothing of one cause from another.
 χ² (of the residuals whitened by the covariance of that fit, so twice the loss of log likelihood) beyond what the nominal truth
 leaves, which differs from the model in its spacing, is the square of the strength. It is by this number that χ² of a noisy
 campaign is larger on average.
@@ -24,8 +24,7 @@ from .runs import RunStore
 from .synthetic import QUIET, measure_hidden
 from .truth import Hidden, TruthTable
 
-ROOM = 2.0  # factor on both ends of the stated range of p_m, for the fit that strengths are counted by: more costs runs
-# in dust that no laboratory has, and few effects that p_m makes up for so well reach any strength at all
+ROOM = 2.0  # factor on both ends of the stated range of p_m, for the fit that strengths are counted by; more costs many runs
 RATIO = 2.0  # of amplitudes simulated, powers of it times the effect's step
 STRIDE = 4.0  # at once, at most
 MOST_NODES = 5  # amplitudes simulated on one side of null

@@ -47,9 +47,7 @@ def fit_deceleration(track: Track, camera: Camera, *, name: object = "track") ->
     valid = track.valid.copy()
     valid[seen[repeated]] = False
     track = replace(track, valid=valid)
-    clocks = [
-        (moved, _move(track, seen, moved)) for moved in propose_moves(frame, time, row, sigma, repeated)
-    ]
+    clocks = [(moved, _move(track, seen, moved)) for moved in propose_moves(time, row, sigma, repeated)]
     if len(clocks) > 1:
         # a clock moved for nothing has to gain what an outlier costs
         clocks.sort(

@@ -72,11 +72,11 @@ def find_repeats(number: np.ndarray, row: FloatArray, sigma: FloatArray) -> np.n
 
 
 def propose_moves(
-    number: np.ndarray, time: FloatArray, row: FloatArray, sigma: FloatArray, repeated: np.ndarray
+    time: FloatArray, row: FloatArray, sigma: FloatArray, repeated: np.ndarray
 ) -> list[FloatArray]:
     """By how much (s, (n,)) the times may have to be moved: first not at all; the motion has to choose.
 
-    number, time, row, sigma, repeated : (n,) of the frames with a position. Then the gaps that the projectile's own steps show,
+    time, row, sigma, repeated : (n,) of the frames with a position. Then the gaps that the projectile's own steps show,
     and the same with every repeated picture put in, not put in place of the next one.
     """
     spacing = float(np.median(np.diff(time)))

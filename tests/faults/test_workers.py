@@ -91,9 +91,8 @@ def test_a_request_to_end_is_taken_as_ctrl_c(begin, tmp_path: Path, whom: str) -
     assert process.returncode == 143, said
     assert said.splitlines() == ["error: stopped; start the same command again to go on from the stored runs"]
     while left := [child for child in children if Path(f"/proc/{child}/cmdline").exists()]:
-        assert time.monotonic() - began < 10.0, (
-            left
-        )  # what counts Python's semaphores ends a moment after its parent
+        # what counts Python's semaphores ends a moment after its parent
+        assert time.monotonic() - began < 10.0, left
         time.sleep(0.05)
 
 
