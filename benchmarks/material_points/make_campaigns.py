@@ -27,7 +27,7 @@ from scan import write_scan
 BEAD = 2540.0 * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 SMALL, LARGE = 0.5e-3, 1.5e-3
 NUMERICS = Numerics(cells=8.0, courant=0.35)
-SCATTER = 0.02  # of p_m from sample to sample
+SCATTER = 0.02  # of p_m from sample to sample, where the plan says no other
 FILLING = 0.150  # as stated
 # radius (m), mass over a bead's, nominal speed (m/s), film after contact (s)
 SERIES = (
@@ -93,14 +93,14 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     folder = out / f".{name}.part"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    p_m = float(hidden["pm"])
+    p_m, scatter = float(hidden["pm"]), hidden.get("scatter", SCATTER)
     measure = hidden.get("measure", {})
     sequence = rng.permutation(len(SERIES)) + 1
     drops = {}
     for k, (radius, heavier, nominal, after) in enumerate(SERIES):
         mass = BEAD * radius**3 * heavier
         speed = nominal * rng.uniform(0.94, 1.06)
-        own = p_m * (1.0 + SCATTER * rng.normal())
+        own = p_m * (1.0 + scatter * rng.normal())
         own *= 1.0 + hidden.get("drift", 0.0) * ((sequence[k] - 1) / (len(SERIES) - 1) - 0.5)
         if radius < 1e-3:
             own *= hidden.get("small_strength", 1.0)
@@ -133,7 +133,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     ct = hidden.get("ct", {})
     for k, nominal in enumerate(SCANS):
         speed = nominal * rng.uniform(0.94, 1.06)
-        own = p_m * (1.0 + SCATTER * rng.normal()) * hidden.get("small_strength", 1.0)
+        own = p_m * (1.0 + scatter * rng.normal()) * hidden.get("small_strength", 1.0)
         mass = BEAD * SMALL**3
         dust = dust_of(hidden, own)
         body = body_of(hidden, SMALL, mass * measure.get("mass", 1.0), sphere=True)

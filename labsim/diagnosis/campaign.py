@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from ..inference.calibrate import (
     warn_of_range,
     warn_unused_scans,
 )
+from ..inference.drop_terms import Terms
 from ..inference.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
-from ..inference.measure import Measurements
+from ..inference.measure import Measurements, measure
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.settle import list_large, settle
@@ -31,6 +32,7 @@ from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, Verdict, judge
 from .pairs import confirm_pairs, return_to_singles, settle_leading
+from .scatter import find_larger, weigh_least
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
@@ -128,6 +130,31 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     )
 
 
+def judge_scatters(open_with: Callable[[Terms], tuple[Workbench, Fit]], *, seed: int = 1) -> Judgement:
+    """judge_campaign with the least scatter of samples, or with what the nominal fit asks for where nothing else is needed then.
+
+    open_with : a workbench and its nominal fit for given error terms. The larger scatter is taken where the nominal model has
+    more evidence with it than anything may reach with the least one, and is called none.
+    """
+    least = weigh_least(Terms().scatter)
+    bench, nominal = open_with(Terms())
+    asked = find_larger(least, bench, nominal)
+    if asked is not None:
+        wider, loose = open_with(replace(Terms(), scatter=asked.value))
+        if asked.log_prior + loose.evidence > least.log_prior + _promise(bench, nominal, seed):
+            found = judge_campaign(wider, loose, seed=seed)
+            if found.verdict.word == "none":
+                return found
+    return judge_campaign(bench, nominal, seed=seed)
+
+
+def _promise(bench: Workbench, nominal: Fit, seed: int) -> float:
+    """ln evidence that the best hypothesis may reach, by what costs next to nothing: tangents, and a law without a name."""
+    best = screen(bench, nominal, np.random.default_rng(seed)).scores[:1]
+    gains = [0.0, *(score.log_bayes / HALF for score in best)]
+    return max(nominal.evidence + max(gains), fit_unknown(bench, nominal).evidence)
+
+
 def diagnose_campaign(
     campaign: Campaign,
     store: RunStore,
@@ -143,18 +170,23 @@ def diagnose_campaign(
     """Measure and calibrate, judge_campaign, and what follows from it: gain on held-out drops, posteriors without and with the
     extension."""
     began = time.perf_counter()
-    bench, nominal = prepare(
-        campaign,
-        store,
-        workers=workers,
-        scheduler=scheduler,
-        progress=progress,
-        use_scans=use_scans,
-        cells=cells,
-        measurements=measurements,
-    )
-    found = judge_campaign(bench, nominal, seed=seed)
-    best = found.best
+    seen = measurements or measure(campaign)
+
+    def open_with(terms: Terms) -> tuple[Workbench, Fit]:
+        return prepare(
+            campaign,
+            store,
+            terms=terms,
+            workers=workers,
+            scheduler=scheduler,
+            progress=progress,
+            use_scans=use_scans,
+            cells=cells,
+            measurements=seen,
+        )
+
+    found = judge_scatters(open_with, seed=seed)
+    bench, nominal, best = found.bench, found.nominal, found.best
     held_nominal, posterior = _predict(bench, nominal, seed, progress)
     held_best, extended = (
         (held_nominal, posterior) if best is nominal else _predict(bench, best, seed, progress)
@@ -191,7 +223,7 @@ def diagnose_campaign(
         posterior_nominal=posterior,
         posterior_extended=extended,
         p_m_averaged=averaged,
-        scatter=estimate_scatter(bench, nominal),
+        scatter=estimate_scatter(bench, best),
         runs_new=store.new,
         runs_reused=store.reused,
         wall=time.perf_counter() - began,

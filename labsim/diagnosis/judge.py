@@ -53,7 +53,7 @@ def judge(
 
     The best cause or pair counts in full against none and unknown. Among those that explain more than none, the others fall
     off behind it by the difference of their gains over TEMPERATURE (NESTED where they are part of the best): they are told apart
-    by residuals of the size of the solver's own error.
+    by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
 
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
     p value of held-out drops with the best cause. Where they are missed, unknown stands to that cause at least as its prior does
@@ -71,11 +71,17 @@ def judge(
     most = max([0.0, *gain.values()])
     ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
     count = max(len(catalogue) * (len(catalogue) - 1) / 2, 1)
+    nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
     for hypothesis, value in gain.items():
         prior = share if len(hypothesis) == 1 else PRIOR_PAIRS / count
-        softened = NESTED if set(hypothesis) < ahead else TEMPERATURE
-        tempered = most - (most - max(value, 0.0)) / softened + min(value, 0.0)
-        weight[hypothesis] = math.log(prior) + nominal.evidence + tempered
+        above = max(value, 0.0)
+        tempered = most - (most - above) / (NESTED if set(hypothesis) < ahead else TEMPERATURE)
+        # what explains less than a part of the best never stands before that part
+        behind = [
+            most - (most - part) / NESTED - (part - above) / TEMPERATURE for part in nested if part >= above
+        ]
+        tempered = min(tempered, *behind) if behind else tempered
+        weight[hypothesis] = math.log(prior) + nominal.evidence + tempered + min(value, 0.0)
     if predicted < PREDICTED:
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound

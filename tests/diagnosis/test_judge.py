@@ -1,8 +1,11 @@
 """What a verdict names beside the first cause."""
 
+import itertools
+from types import SimpleNamespace
+
 import pytest
 
-from labsim.diagnosis.judge import Verdict
+from labsim.diagnosis.judge import Verdict, judge
 
 SHEAR, TENSILE, GAS, NONE = ("shear_strength",), ("tensile_strength",), ("pore_gas",), ("none",)
 
@@ -24,3 +27,22 @@ def test_a_verdict_names_what_the_data_hardly_tell_from_the_first(probabilities,
 def test_where_nothing_listed_is_at_work_no_cause_is_named(word):
     verdict = Verdict(word, [((word,), 0.8), (SHEAR, 0.15), (GAS, 0.05)])
     assert verdict.named == [((word,), 0.8)]
+
+
+@pytest.mark.parametrize(
+    "gains", [(50.0, 20.0, 49.0), (30.0, 27.0, 27.5), (50.0, 49.0, 48.9), (4.0, 1.0, -3.0)]
+)
+@pytest.mark.parametrize("lead", [0.5, 6.0, 30.0])
+def test_a_single_with_less_evidence_never_stands_before_one_with_more(gains, lead):
+    """Behind a pair too, whose own singles are softened less than others."""
+    names = ["first", "second", "other"]
+    fits = [
+        SimpleNamespace(hypothesis=(name,), evidence=gain) for name, gain in zip(names, gains, strict=True)
+    ]
+    fits.append(SimpleNamespace(hypothesis=("first", "second"), evidence=max(gains) + lead))
+    nominal = SimpleNamespace(evidence=0.0)
+    verdict = judge(nominal, fits, -100.0, names, {})
+    probability = dict(verdict.probabilities)
+    assert sum(probability.values()) == pytest.approx(1.0)
+    for (a, x), (b, y) in itertools.combinations(zip(names, gains, strict=True), 2):
+        assert (x - y) * (probability[a,] - probability[b,]) > 0.0
