@@ -186,10 +186,12 @@ def say_verdict(found: Diagnosis) -> str:
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in found.verdict.named[1:])
     hardly = f" (these data hardly tell it from {apart})" if apart else ""
-    p_m = np.median(found.posterior_extended.samples("p_m_Pa")) / 1e3
+    p_m = f"{np.median(found.posterior_extended.samples('p_m_Pa')) / 1e3:.2f} kPa"
+    before = f"{nominal:.2f} kPa"
+    moved = f"is {p_m} instead of {before}" if p_m != before else f"stays {p_m}"
     return (
         f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}{hardly}; with "
-        f"{' + '.join(best)} p_m is {p_m:.2f} kPa instead of {nominal:.2f} kPa, and "
+        f"{' + '.join(best)} p_m {moved}, and "
         f"{say_gain(found.gain)}."
     )
 

@@ -80,7 +80,7 @@ def describe_calibration(
     if drops > 1:
         words += (
             f"From drop to drop p_m scatters by {100 * scatter[0]:.1f} ± {100 * scatter[1]:.1f} %; the likelihood allows "
-            f"{100 * bench.terms.scatter:g} %. "
+            f"{100 * bench.terms.scatter:.2g} %. "
         )
     words += f"The sampling is converged: R-hat {first.r_hat:.3f}, {first.ess:.0f} independent samples."
     if not first.r_hat < 1.05:

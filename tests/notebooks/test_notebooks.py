@@ -27,7 +27,7 @@ NOTEBOOKS = {
         [
             r"508 stored runs",
             r"ratio at equal speed 3\.00",
-            r"stored stopping time (1\.00|0\.99)\d",
+            r"stored stopping time 0\.9[78]\d",
             r"nominal: T_s ratio 2\.4",
         ],
     ),

@@ -14,7 +14,7 @@ parameters = (
         "alpha",
         "1",
         null=IN_USE,
-        limits=(0.1 * IN_USE, 4.0 * IN_USE),
+        limits=(0.05, 2.0),
         prior=LogNormal(IN_USE, 0.7),
         step=0.5 * IN_USE,
         symbol="α",
