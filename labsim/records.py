@@ -61,9 +61,13 @@ class Material:
     bulk_exponent: float = 4.0
     shear_to_bulk: float = 0.5
     contact_friction: float = 0.0
+    law: str = "porous_dust"  # a file of labsim/sph/materials, or the path of one
+    constants: tuple[
+        tuple[str, float], ...
+    ] = ()  # of another law: its parameters that are not at their defaults
 
-    def replace(self, **changes: float) -> Material:
-        return replace(self, **changes)
+    def replace(self, **changes: object) -> Material:
+        return replace(self, **changes)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

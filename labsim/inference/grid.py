@@ -23,7 +23,7 @@ from .runs import Progress, RunStore
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 FEWEST_SPEEDS = 3
-DEFAULT_CELLS = 5  # spacings in a tip radius; docs/numerics.md: 0.43 % of the depth left at that
+DEFAULT_CELLS = 5  # spacings in a tip radius; docs/numerics.md: 0.33 % of the depth left at that
 COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
 

@@ -67,13 +67,18 @@ class Stored:
 
 
 def canonical(setting: DropSetting) -> str:
-    """The setting as JSON in which equal settings are equal texts (every number as an exact hexadecimal float)."""
-    return json.dumps(_exact(dataclasses.asdict(setting)), sort_keys=True, separators=(",", ":"))
+    """The setting as JSON in which equal settings are equal texts (every number as an exact hexadecimal float).
+
+    A law from elsewhere goes by its name: what is in its file is part of the solver's hash, where it lies changes nothing.
+    """
+    values = dataclasses.asdict(setting)
+    values["material"]["law"] = Path(setting.material.law).stem
+    return json.dumps(_exact(values), sort_keys=True, separators=(",", ":"))
 
 
 def make_key(setting: DropSetting, solver: str | None = None) -> str:
     """sha256 over the file format, the solver's sources and the setting."""
-    text = json.dumps([FORMAT, solver or solver_hash(), canonical(setting)])
+    text = json.dumps([FORMAT, solver or solver_hash(setting.material.law), canonical(setting)])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -99,7 +104,7 @@ def write_run_file(path: Path, run: DropRun | FailedRun, wall: float = 0.0) -> P
         stored.attrs.update(
             format=FORMAT,
             key=make_key(setting),
-            solver=solver_hash(),
+            solver=solver_hash(setting.material.law),
             setting_key=canonical(setting),
             setting=json.dumps(dataclasses.asdict(setting)),
             status="failed" if isinstance(run, FailedRun) else "done",

@@ -22,7 +22,8 @@ import filelock
 import platformdirs
 
 from ..errors import InferenceError, LabsimError, SimulationError
-from ..sph import DropRun, DropSetting, simulate, solver_hash
+from ..sph import DropRun, DropSetting, simulate
+from ..sph.materials import is_current
 from ..text_files import load_json
 from .run_file import (
     DAMAGE,
@@ -241,7 +242,7 @@ class RunStore:
         """Remove damaged files and left-overs, runs of other solvers, failed runs, or everything; return how many."""
         doomed = {file for file, _reason in self.verify()}
         for entry in self.index():
-            old = other_solvers and entry.solver != solver_hash()
+            old = other_solvers and not is_current(entry.solver)
             if everything or old or (failed and entry.status == "failed"):
                 doomed.add(self.path(entry.key))
         for part in self.folder.glob("??/.*.part"):

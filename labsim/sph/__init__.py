@@ -1,8 +1,8 @@
 """The bundled SPH solver: a drop setting in, depth against time and the filling factor out. SI throughout."""
 
-from ._jit import solver_hash
 from .convergence import ConvergedRun, extrapolate, refine, simulate_spacings
 from .drop import simulate
+from .materials import solver_hash
 from .run import DropRun, Particles
 from .setting import DropSetting, Numerics, check_setting
 

@@ -15,14 +15,14 @@ import numpy as np
 from ..errors import SimulationError
 from ..records import FloatArray, Projectile
 from . import particles as rows
-from .advance import LOG, advance
 from .lines import ROOM, WIDTH, make_lines, make_rows
-from .materials.porous_dust import elastic_energy, tabulate_strengths
+from .loop import load_loop
+from .materials import find_law
 from .neighbours import Neighbours
-from .particles import place_particles
-from .projectile import solve_wall_weight
+from .particles import name_rows, place_particles
 from .run import DropRun, make_run
 from .setting import DropSetting, check_setting
+from .state import LAST_STEP, LOG, SPEED, TIME, TIP, Lines, Lists, Numbers, Outside, Stretch
 
 STEPS_AT_ONCE = 64
 LEAST = 0.1  # of the skin: a list that allows less is made anew
@@ -48,7 +48,7 @@ def evolve(
     steps_at_once: int = STEPS_AT_ONCE,
     planes: tuple[float, ...] = (),
 ) -> Evolution:
-    """Move particles of any initial state (rows of ``particles.ROWS``, n) until ``setting.duration``, or past the stop.
+    """Move particles of any initial state (rows of ``fill_at_rest``, n) until ``setting.duration``, or past the stop.
 
     wall particles keep the velocity they have. body: height (m) and velocity (m/s, upwards) of the projectile's tip,
     then time and two zeros; far above the dust it is as good as absent. watch is called with time and state between
@@ -68,29 +68,49 @@ def evolve(
     state[:, :n] = dust
     per_unit = 2 * math.pi if axisymmetric else 1.0
     force_scale = 1 / per_unit
-    strength, tension = tabulate_strengths(material, setting.strength_shape)
-    depth_law = _split(setting.force_of_depth, force_scale)
-    speed_law = _split(setting.force_of_speed, force_scale)
-    law = (
-        setting.monomer_density, material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk,
-        material.shear_factor, setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
-    )  # fmt: skip
-    plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
-    wall_weight = solve_wall_weight(numerics.smoothing)  # a millisecond
-    hold_apart = (1,) if numerics.artificial_stress > 0.0 else ()
-    part = 1 - 0.5 / numerics.smoothing
-    artificial_stress = (numerics.artificial_stress, 1 / (part**4 * (5 - 4 * part)))
-    viscosity = (numerics.alpha, numerics.beta, numerics.affine)
-    extras = () if plain else (1,)  # two types, so two compiled versions
+    law = find_law(material.law)
+    constants, tables, advance = (
+        law.make_constants(setting),
+        law.make_tables(setting),
+        load_loop(material.law),
+    )
+    outside = Outside(
+        setting.side_friction * force_scale,
+        *_split(setting.force_of_depth, force_scale),
+        *_split(setting.force_of_speed, force_scale),
+    )
     log = np.zeros((4096, len(LOG)))
-    log[0, 1], log[0, 2] = -body[0], -body[1]
+    log[0, 1], log[0, 2] = -body[TIP], -body[SPEED]
+    lost = np.zeros(2)
     fixed = np.nonzero(wall)[0].astype(np.uint32)
-    free_mass = float(dust[rows.MASS, ~wall].sum())
+    part = 1 - 0.5 / numerics.smoothing
+    numbers = Numbers(
+        n=n,
+        axisymmetric=axisymmetric,
+        free_mass=float(dust[rows.MASS, ~wall].sum()),
+        is_rod=projectile.tip == "hemisphere",
+        tip_radius=projectile.tip_radius,
+        body_mass=projectile.mass / per_unit,
+        gravity=setting.gravity,
+        friction=material.contact_friction,
+        spacing=setting.spacing,
+        h=h,
+        courant=numerics.courant,
+        alpha=numerics.alpha,
+        beta=numerics.beta,
+        affine=numerics.affine,
+        front=numerics.front,
+        hold_apart=(1,) if numerics.artificial_stress > 0.0 else (),
+        artificial_stress=numerics.artificial_stress,
+        per_kernel=1 / (part**4 * (5 - 4 * part)),
+        diffusivity=numerics.exchange * h * h,
+        reference=setting.filling_factor,
+    )
     made, builds, stop_step, limit = 0, 0, None, setting.duration
     farthest = 1000 * (np.abs(dust[[rows.X, rows.Z]]).max() + setting.spacing)
-    while body[2] < limit:
+    while body[TIME] < limit:
         if not np.abs(state[[rows.X, rows.Z], :n]).max() < farthest:
-            raise _blown_up(setting, made, body[2])
+            raise _blown_up(setting, made, body[TIME])
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
         if n + source.size + WIDTH > state.shape[1]:
             front, back = (make_lines(n + source.size + 64 + WIDTH) for _ in range(2))
@@ -103,32 +123,31 @@ def evolve(
         builds += 1
         allowed, begun = 0.45 * skin, state[rows.X, :n].copy()
         fresh = False
-        while allowed > LEAST * skin and body[2] < limit:
+        while allowed > LEAST * skin and body[TIME] < limit:
             if not fresh:
                 origin = state[[rows.X, rows.Z], :n].copy()
                 near, inner, body_origin = _find_near(
-                    state[:, :n], projectile, setting.spacing, body[0], skin, axisymmetric
+                    state[:, :n], projectile, setting.spacing, body[TIP], skin, axisymmetric
                 )
+                films = np.zeros_like(near)
             if made + steps_at_once + 2 > len(log):
                 log = np.concatenate([log, np.zeros_like(log)])
-            left = math.ceil((limit - body[2]) / body[4]) if body[4] > 0.0 else 1
+            left = math.ceil((limit - body[TIME]) / body[LAST_STEP]) if body[LAST_STEP] > 0.0 else 1
             steps = min(steps_at_once, max(left, 1))
             done = advance(
-                state, front, back, nearby, beyond, n, axisymmetric, source, twice_plane, fixed, free_mass, near,
-                inner, body_origin, neighbours.start, neighbours.list, origin, allowed, steps, log, made + 1, body,
-                projectile.tip == "hemisphere", projectile.tip_radius, projectile.mass / per_unit,
-                setting.gravity, setting.spacing, h, numerics.courant, viscosity, numerics.front,
-                hold_apart, artificial_stress, numerics.contact_gap, wall_weight, numerics.contact_stiffness,
-                material.contact_friction, setting.side_friction * force_scale,
-                *depth_law, *speed_law, stop_step is not None, law, extras, strength, tension,
+                *name_rows(setting, state),
+                Lists(neighbours.start, neighbours.list, source, twice_plane, fixed, near, inner, films, origin),
+                Lines(front, back, nearby, beyond, lost),
+                numbers, outside, constants, tables, log, body,
+                Stretch(steps, made + 1, allowed, body_origin, stop_step is not None),
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():
-                raise _blown_up(setting, made + max(done, 0), body[2])
+                raise _blown_up(setting, made + max(done, 0), body[TIME])
             made += done
             fresh = done == steps
-            if body[1] >= 0.0 and stop_step is None:
+            if body[SPEED] >= 0.0 and stop_step is None:
                 stop_step = made
-                limit = min(limit, body[2] * (1 + setting.after_stop))
+                limit = min(limit, body[TIME] * (1 + setting.after_stop))
                 at_stop = state[:, :n].copy()
             if not fresh:
                 state[rows.X, n : n + source.size] = twice_plane - state[rows.X, source]
@@ -138,7 +157,7 @@ def evolve(
                     allowed = min(allowed, 2 * skin - np.abs(state[rows.X, :n] - begun).max())
             if watch is not None:
                 _fill_elastic(setting, state[:, :n])
-                watch(float(body[2]), state[:, :n])
+                watch(float(body[TIME]), state[:, :n])
     end = state[:, :n]
     if stop_step is None:
         at_stop = end.copy()
@@ -181,10 +200,7 @@ def _blown_up(setting: DropSetting, steps: int, reached: float) -> SimulationErr
 
 def _fill_elastic(setting: DropSetting, state: FloatArray) -> None:
     """Elastic energy per mass is a function of the state, so it is worked out only where somebody looks."""
-    stress = (state[k] for k in (rows.SXX, rows.SZZ, rows.SXZ))
-    state[rows.ELASTIC] = elastic_energy(
-        state[rows.DENSITY], state[rows.ZERO_STRESS], *stress, setting.material, setting.monomer_density
-    )
+    state[rows.ELASTIC] = find_law(setting.material.law).elastic_energy(setting, *name_rows(setting, state))
 
 
 def _find_near(

@@ -25,8 +25,9 @@ def mirror_axis(n, count, source, row, sign):
 
 
 @compiled
-def renormalise(low, high, gxx, gxz, gzz, lxx, lxz, lzx, lzz):
+def renormalise(low, high, s):
     """Invert the symmetric moment matrices in place (g becomes B) and apply them to the raw velocity gradients."""
+    gxx, gxz, gzz, lxx, lxz, lzx, lzz = s.gxx, s.gxz, s.gzz, s.lxx, s.lxz, s.lzx, s.lzz
     for i in range(low, high):
         a, b, c = gxx[i], gxz[i], gzz[i]
         smallest = 0.5 * (a + c) - math.sqrt(0.25 * (a - c) ** 2 + b * b)
@@ -44,10 +45,10 @@ def renormalise(low, high, gxx, gxz, gzz, lxx, lxz, lzx, lzz):
 
 
 @compiled
-def carry_stress(
-    low, high, ring, pressure, sxx, szz, sxz, bxx, bxz, bzz, lxz, lzx, mxx, mxz, mzx, mzz, shear
-):
+def carry_stress(low, high, s):
     """M = ring radius · stress · B, what each particle brings into the sum of forces, and the shear rate lxz + lzx."""
+    ring, pressure, sxx, szz, sxz, lxz, lzx = s.ring, s.pressure, s.sxx, s.szz, s.sxz, s.lxz, s.lzx
+    bxx, bxz, bzz, mxx, mxz, mzx, mzz, shear = s.gxx, s.gxz, s.gzz, s.mxx, s.mxz, s.mzx, s.mzz, s.shear
     for i in range(low, high):
         a = (sxx[i] - pressure[i]) * ring[i]
         c = (szz[i] - pressure[i]) * ring[i]
@@ -60,7 +61,7 @@ def carry_stress(
 
 
 @compiled
-def find_fronts(low, high, axisymmetric, front, h, vr, ring, sound, lxx, lzz, shear):
+def find_fronts(low, high, axisymmetric, front, h, s):
     """Take the linear velocity field (lxx, lzz, shear = lxz + lzx) away where the dust is pressed together along one line.
 
     Viscosity acts on what particles' linear fields leave of a jump. In a compaction front the linear field is the jump, and
@@ -68,6 +69,7 @@ def find_fronts(low, high, axisymmetric, front, h, vr, ring, sound, lxx, lzz, sh
     that on), and close to uniaxial: -div v over the norm of the strain rate from 0.7 (equal to shear) to 1.
     """
     hoops = 1.0 if axisymmetric else 0.0
+    vr, ring, sound, lxx, lzz, shear = s.u, s.ring, s.sound, s.lxx, s.lzz, s.shear
     for i in range(low, high):
         hoop = hoops * vr[i] / ring[i]
         a, b, c = lxx[i], lzz[i], shear[i]
@@ -82,13 +84,14 @@ def find_fronts(low, high, axisymmetric, front, h, vr, ring, sound, lxx, lzz, sh
 
 
 @compiled
-def bound_step(low, high, axisymmetric, h, ring, sound, bxx, bzz, worst):
+def bound_step(low, high, axisymmetric, h, s, worst):
     """The larger of ``worst`` and of c² (1 + (a h/r)²) max(1, tr B / (2 FEW))², m²/s², over particles low..high-1.
 
     Near the axis the hoop strain v/r is stiffer than any gradient, and so is the gradient of a particle with few neighbours: both
     ask for a shorter step.
     """
     reach = HOOP_STIFFNESS * h if axisymmetric else 0.0
+    ring, sound, bxx, bzz = s.ring, s.sound, s.gxx, s.gzz
     for i in range(low, high):
         ratio = reach / ring[i]
         few = max((bxx[i] + bzz[i]) * (0.5 / FEW), 1.0)
@@ -97,11 +100,30 @@ def bound_step(low, high, axisymmetric, h, ring, sound, bxx, bzz, worst):
 
 
 @compiled
-def deform(low, high, dt, lxx, lxz, lzx, lzz, dxx, dxz, dzx, dzz):
+def deform(low, high, dt, s):
     """Deformation gradient in the plane, dD/dt = L D: tells how thin the dust beside the projectile has become."""
+    lxx, lxz, lzx, lzz, dxx, dxz, dzx, dzz = s.lxx, s.lxz, s.lzx, s.lzz, s.dxx, s.dxz, s.dzx, s.dzz
     for i in range(low, high):
         a, b, c, d = dxx[i], dxz[i], dzx[i], dzz[i]
         dxx[i] = a + dt * (lxx[i] * a + lxz[i] * c)
         dxz[i] = b + dt * (lxx[i] * b + lxz[i] * d)
         dzx[i] = c + dt * (lzx[i] * a + lzz[i] * c)
         dzz[i] = d + dt * (lzx[i] * b + lzz[i] * d)
+
+
+@compiled
+def find_compaction(low, high, axisymmetric, scale, reference, s):
+    """Density that each particle would have, had it begun at φ = ``reference``; and with what diffusivity, m²/s, neighbours
+    exchange it: ``scale`` (m²) times the rate at which dust is crushed. Nothing creeps at rest or in elastic dust, a crust
+    stays a crust. Where dust is pressed along one line there is none: a plane front needs no help.
+    """
+    hoops = 1.0 if axisymmetric else 0.0
+    vr, ring, lxx, lxz, lzx, lzz, crushing = s.u, s.ring, s.lxx, s.lxz, s.lzx, s.lzz, s.crushing
+    density, initial, compaction, diffusivity = s.density, s.initial, s.compaction, s.diffusivity
+    for i in range(low, high):
+        hoop = hoops * vr[i] / ring[i]
+        a, b, c = lxx[i], lzz[i], lxz[i] + lzx[i]
+        size = math.sqrt(a * a + b * b + hoop * hoop + 0.5 * c * c)
+        along = min(max((-(a + b + hoop) / max(size, 1.0e-300) - 0.6) / 0.3, 0.0), 1.0)
+        compaction[i] = density[i] * (reference / initial[i])
+        diffusivity[i] = scale * crushing[i] * (1.0 - along)

@@ -87,7 +87,6 @@ def _make_reader(wanted: int):
 
 
 read_five = _make_reader(5)
-read_six = _make_reader(6)
 read_eight = _make_reader(8)
 
 

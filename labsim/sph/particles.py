@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..records import FloatArray
-from .materials import porous_dust
+from .materials import find_law
 from .setting import DropSetting
+from .state import Rows
 
-ROWS = (
-    "x z u w mass area ring weight sound density zero_stress initial sxx szz sxz pressure work elastic heat "
-    "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz shear distance nx nz "
-    "thickness rest_density compressive tensile"
-).split()
 (
-    X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, ZERO_STRESS, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
+    X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
     HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, SHEAR,
-    DISTANCE, NX, NZ, THICKNESS, REST_DENSITY, COMPRESSIVE, TENSILE,
-) = range(len(ROWS))  # fmt: skip
+    DISTANCE, NX, NZ, THICKNESS, GRIP, WALL_RATE, COMPACTION, DIFFUSIVITY, EXCHANGE, EXCHANGED,
+    CRUSHING, PUSH_X, PUSH_Z,
+) = range(len(Rows._fields))  # fmt: skip
 
 WALL_LAYERS = 3  # of particles held still at the sides and the bottom
+
+
+def name_rows(setting: DropSetting, state: FloatArray) -> tuple[Rows, Any]:
+    """The rows of ``state`` by name: those that every law has, and the law's own."""
+    common = len(Rows._fields)
+    return Rows(*state[:common]), find_law(setting.material.law).State(*state[common:])
 
 
 def initial_filling_factor(setting: DropSetting, depth: FloatArray) -> FloatArray:
@@ -40,26 +45,27 @@ def fill_at_rest(
     setting: DropSetting, x: FloatArray, z: FloatArray, phi: FloatArray, pressure: FloatArray | float = 0.0
 ) -> FloatArray:
     """State (rows, n) of particles at rest at x, z (m), one a spacing², under an elastic pressure (Pa) alone."""
-    material = setting.material
-    state = np.zeros((len(ROWS), x.size))
+    law = find_law(setting.material.law)
+    own, sound = law.start(setting, phi, pressure)
+    state = np.zeros((len(Rows._fields) + len(own), x.size))
     state[X], state[Z] = x, z
     state[INITIAL] = phi
-    state[DENSITY] = state[REST_DENSITY] = phi * setting.monomer_density
+    state[DENSITY] = phi * setting.monomer_density
     state[RING] = x if setting.geometry == "axisymmetric" else 1.0
     state[AREA] = setting.spacing**2
     state[MASS] = state[DENSITY] * state[RING] * state[AREA]
     state[PRESSURE] = pressure
-    state[ZERO_STRESS] = porous_dust.zero_stress_filling_factor(phi, state[PRESSURE], material)
-    stiffness = porous_dust.bulk_modulus(phi, material)
-    state[SOUND] = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / state[DENSITY])
+    state[SOUND] = sound
     state[DXX] = state[DZZ] = state[THICKNESS] = 1.0
+    for k, row in enumerate(own):
+        state[len(Rows._fields) + k] = row
     return state
 
 
 def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     """State (rows, n) of the dust at rest on a square lattice whose surface is z = 0, and which particles are walls.
 
-    The dust starts in hydrostatic balance (isotropic, within 0.8 Σ): φ0' is what carries the weight above.
+    The dust starts in hydrostatic balance (isotropic, within what the law can bear).
     """
     spacing = setting.spacing
     width, depth = setting.extent
@@ -73,8 +79,8 @@ def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     x, z = x.ravel(), z.ravel()
     phi = initial_filling_factor(setting, -z)
     weight_above = setting.gravity * setting.monomer_density * _filling_above(setting, -z)
-    strength = porous_dust.compressive_strength(phi, setting.material)
-    state = fill_at_rest(setting, x, z, phi, np.minimum(weight_above, 0.8 * strength))
+    bearable = find_law(setting.material.law).bearable_pressure(setting, phi)
+    state = fill_at_rest(setting, x, z, phi, np.minimum(weight_above, bearable))
     edge = width if axisymmetric else width / 2
     wall = (z < -depth + WALL_LAYERS * spacing) | (np.abs(x) > edge - WALL_LAYERS * spacing)
     return state, wall

@@ -1,50 +1,29 @@
 """The rigid projectile: where its surface is, and what it and the dust do to each other.
 
-Contact is a stiff push along the surface normal, never a pull, with Coulomb friction. Two things make it converge fast in
-the spacing (docs/numerics.md has the figures):
+A particle near the projectile has neighbours on one side only: of what its kernel weighs, the share m(d) lies beyond the surface,
+a half at d = 0. There the velocity is taken as linear from the particle to the wall, so the wall gives that share of the normal
+strain rate, and by the adjoint of that very gradient that share of the normal stress pushes the wall:
 
-- Its reach is the half thickness of the cell of a particle that lies against it. Flow along the surface thins a cell to
-  |Dᵀn| of its width while others move in beside it, compaction alone would leave it 1/J: the geometric mean is used.
-- A particle there has neighbours on one side only, and its gradient across the surface would count its whole volume, of which
-  half lies between it and the surface. WALL_WEIGHT is the share with which uniform stress leaves no force on the next
-  particles (the patch test on the lattice, solved for the kernel in use).
+    n·L·n = (1 - m) (n·L·n of the neighbours) + m (v - v_wall)·n / d,    force = m p V / d
+
+Strain and force come from one gradient, so contact takes no energy. It is closed where dust reaches up to the surface: a cell is
+as thick as the deformation gradient D leaves it, dx |Dᵀn|, and keeps the wall from nothing that lies behind it. Never a pull;
+Coulomb friction on request.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ._jit import compiled
-from .pairs import GRADIENT_NORM
 
 SLIP_SPEED = 1.0e-3  # m/s, over which friction turns round
-
-
-def solve_wall_weight(smoothing: float) -> float:
-    """Weight of the outermost lattice layer's normal gradient for which uniform stress leaves no net force on the second.
-
-    smoothing : smoothing length in spacings. Nodal integration on a half plane of unit spacing; linear in the weight.
-    """
-    layers, columns = 12, np.arange(-6, 7)
-
-    def slope(across: float, along: float) -> float:
-        part = 1 - math.hypot(across, along) / (2 * smoothing)
-        return GRADIENT_NORM / smoothing**4 * max(part, 0.0) ** 3
-
-    coupling = np.array(
-        [[sum(slope(k - l, c) for c in columns) * (l - k) for l in range(layers)] for k in range(layers)]
-    )
-    offsets = np.arange(layers)[None, :] - np.arange(layers)[:, None]
-    moment = -np.sum(coupling * offsets, axis=1)
-    # force on the second layer from layer l: (weight_l / moment_l + weight_1 / moment_1) coupling
-    inverse = 1 / moment
-    rest = (
-        sum((inverse[l] + inverse[1]) * coupling[1, l] for l in range(1, layers))
-        + inverse[1] * coupling[1, 0]
-    )
-    return float(-rest / (inverse[0] * coupling[1, 0]))
+TOUCHING = 1.05  # half thicknesses of a cell at which contact begins to close
+CLOSING = 0.2  # of a half thickness, over which it closes
+COVERING = 0.5  # of that, from which on all that lies behind the cell is in contact
+COLUMN = 0.75  # spacings to either side of a cell that it covers, fully up to a quarter: one spacing wide, its edges blurred
+RANGE = 1.6  # smoothing lengths from which on nothing of the kernel is missing
+CLOSEST = 0.2  # spacings; films nearer than that are as stiff as if they were there, for the sake of the step
 
 
 @compiled
@@ -61,12 +40,12 @@ def interpolate(at, knots, values):
 
 
 @compiled
-def measure_surface(
-    near, is_rod, tip_radius, tip_z, spacing, x, z, dxx, dxz, dzx, dzz, distance, nx, nz, thickness
-):
+def measure_surface(near, is_rod, tip_radius, tip_z, spacing, s):
     """Distance to the projectile's surface, its normal into the dust, and the share of its width that each particle's cell
     has kept along that normal, for the particles ``near``. Beyond two spacings it only gets a large distance."""
     centre = tip_z + tip_radius
+    x, z, dxx, dxz, dzx, dzz = s.x, s.z, s.dxx, s.dxz, s.dzx, s.dzz
+    distance, nx, nz, thickness = s.distance, s.nx, s.nz, s.thickness
     for i in near:
         distance[i] = 1.0e9
         if is_rod and z[i] > centre:
@@ -89,63 +68,140 @@ def measure_surface(
 
 
 @compiled
-def weigh_wall_layer(
-    near, dt, spacing, weight, distance, nx, nz, thickness, ring, bxx, bxz, bzz, mxx, mxz, mzx, mzz,
-    lxx, lxz, lzx, lzz, sxx, szz, sxz, pressure, density, work,
-):  # fmt: skip
-    """Reduce the normal part of the gradient that carries the stress of particles lying against the projectile to
-    ``weight``: B <- (I - (1 - weight) n n) B in M. Fades out between 1.3 and 2 half thicknesses from the surface. The stress
-    power booked for them is reduced alike; the contact books what the dust between them and the surface takes."""
+def close_contact(near, films, h, spacing, s):
+    """grip m/d (1/m) of each particle ``near`` the surface: the share m of its kernel that the wall stands for, over the
+    distance.
+
+    Wendland's kernel misses m = ½ (1 - (d/1.6 h)²)² of its second moment beyond a plane at d, to 0.02. films: room for the
+    indices of cells that touch, (near.size,).
+    """
+    x, z, distance, thickness, nx, nz, grip = s.x, s.z, s.distance, s.thickness, s.nx, s.nz, s.grip
+    count = 0
     for i in near:
-        if distance[i] < 2.0 * spacing:
-            half = 0.5 * spacing * thickness[i]
-            share = (1.0 - weight) * min(max((2.0 * half - distance[i]) / (0.7 * half), 0.0), 1.0)
-            if share > 0.0:
-                a, b = nx[i], nz[i]
-                traction_x = (sxx[i] - pressure[i]) * a + sxz[i] * b
-                traction_z = sxz[i] * a + (szz[i] - pressure[i]) * b
-                first = share * ring[i] * (a * bxx[i] + b * bxz[i])
-                second = share * ring[i] * (a * bxz[i] + b * bzz[i])
-                mxx[i] -= traction_x * first
-                mxz[i] -= traction_x * second
-                mzx[i] -= traction_z * first
-                mzz[i] -= traction_z * second
-                work[i] -= (
-                    dt * share / density[i]
-                    * (traction_x * (lxx[i] * a + lxz[i] * b) + traction_z * (lzx[i] * a + lzz[i] * b))
-                )  # fmt: skip
+        half = 0.5 * spacing * thickness[i]
+        grip[i] = (TOUCHING * half - distance[i]) / (CLOSING * half)
+        if grip[i] > 0.0:
+            films[count] = i
+            count += 1
+    for i in near:
+        part = min(grip[i], 1.0)
+        grip[i] = 0.0
+        far = max(distance[i], 0.0) / (RANGE * h)
+        if far < 1.0:
+            if part <= 0.0:
+                for k in range(count):
+                    j = films[k]
+                    across = abs((x[i] - x[j]) * nz[i] - (z[i] - z[j]) * nx[i]) / spacing
+                    if across < COLUMN:
+                        half = 0.5 * spacing * thickness[j]
+                        closed = min((TOUCHING * half - distance[j]) / (COVERING * CLOSING * half), 1.0)
+                        part = max(part, closed * min(2.0 * (COLUMN - across), 1.0))
+            left = 1.0 - far * far
+            grip[i] = max(part, 0.0) * 0.5 * left * left / max(distance[i], CLOSEST * spacing)
 
 
 @compiled
-def press(
-    near, speed_z, spacing, gap, stiffness, friction, distance, nx, nz, thickness, rest_density,
-    u, w, mass, density, sound, fx, fz, energy,
-):  # fmt: skip
-    """Add contact forces to fx, fz; return the force on the projectile along z (per radian or metre).
+def bound_contact(near, h, s, worst):
+    """The larger of ``worst`` and of c² (1 + (0.6 h · grip)²), m²/s²: as ``bound_step`` for particles near the wall."""
+    sound, grip = s.sound, s.grip
+    for i in near:
+        ratio = 0.6 * h * grip[i]
+        worst = max(worst, sound[i] ** 2 * (1.0 + ratio * ratio))
+    return worst
 
-    energy[0] is set to the power that goes into the contact (held there, or spent on the thinning of the dust between the
-    particles and the surface), energy[1] to the power lost to friction.
+
+@compiled
+def strain_against_wall(near, speed_z, s):
+    """Let the wall take part in the normal row of the velocity gradient L: n·L gets grip ((v - v_wall)·n - d n·L·n) Bn/(n·Bn),
+    exact where the velocity is linear up to the wall. wall_rate: that change over grip, for the book of energy. grip becomes 0
+    where the dust is pulled and moves away.
     """
+    distance, nx, nz, u, w, sxx, szz, sxz, pressure = (
+        s.distance,
+        s.nx,
+        s.nz,
+        s.u,
+        s.w,
+        s.sxx,
+        s.szz,
+        s.sxz,
+        s.pressure,
+    )
+    bxx, bxz, bzz, lxx, lxz, lzx, lzz = s.gxx, s.gxz, s.gzz, s.lxx, s.lxz, s.lzx, s.lzz
+    grip, wall_rate = s.grip, s.wall_rate
+    for i in near:
+        if grip[i] > 0.0:
+            a, b = nx[i], nz[i]
+            along_x = a * bxx[i] + b * bxz[i]
+            along_z = a * bxz[i] + b * bzz[i]
+            across = along_x * a + along_z * b
+            own = (a * lxx[i] + b * lzx[i]) * a + (a * lxz[i] + b * lzz[i]) * b
+            away = u[i] * a + (w[i] - speed_z) * b
+            stress = (sxx[i] - pressure[i]) * a * a + 2.0 * sxz[i] * a * b + (szz[i] - pressure[i]) * b * b
+            if across > 0.0 and (stress < 0.0 or away < 0.0):
+                wall_rate[i] = (away - max(distance[i], 0.0) * own) / across
+                change = grip[i] * wall_rate[i]
+                lxx[i] += a * along_x * change
+                lxz[i] += a * along_z * change
+                lzx[i] += b * along_x * change
+                lzz[i] += b * along_z * change
+            else:
+                grip[i] = 0.0
+
+
+@compiled
+def press(near, speed_z, friction, s, energy):
+    """The adjoint of ``strain_against_wall``: take the wall's share out of M (what a particle's stress brings into the sum of
+    forces), set fx, fz to the wall's push, and return the force on the projectile along z (per radian or metre).
+
+    Where the traction would pull there is no force, and grip is set to 0: energy[0] is the power that the stresses spent on
+    the wall's strain all the same; energy[1] is the power lost to friction.
+    """
+    distance, nx, nz, grip, wall_rate, ring, mass = (
+        s.distance,
+        s.nx,
+        s.nz,
+        s.grip,
+        s.wall_rate,
+        s.ring,
+        s.mass,
+    )
+    density, u, w, sxx, szz, sxz, pressure = s.density, s.u, s.w, s.sxx, s.szz, s.sxz, s.pressure
+    bxx, bxz, bzz, mxx, mxz, mzx, mzz = s.gxx, s.gxz, s.gzz, s.mxx, s.mxz, s.mzx, s.mzz
+    fx, fz = s.push_x, s.push_z
     force = 0.0
     taken = 0.0
     lost = 0.0
     for i in near:
-        if distance[i] < spacing:
-            reach = gap * spacing * math.sqrt(thickness[i] * min(rest_density[i] / density[i], 1.0))
-            overlap = reach - distance[i]
-            if overlap > 0.0:
-                push = stiffness * mass[i] * (sound[i] / spacing) ** 2 * overlap
-                taken -= push * (u[i] * nx[i] + (w[i] - speed_z) * nz[i])
-                px, pz = push * nx[i], push * nz[i]
-                if friction > 0.0:
-                    slip = -u[i] * nz[i] + (w[i] - speed_z) * nx[i]
-                    drag = -friction * push * slip / (abs(slip) + SLIP_SPEED)
-                    px -= drag * nz[i]
-                    pz += drag * nx[i]
-                    lost -= drag * slip
-                fx[i] += px
-                fz[i] += pz
-                force -= pz
+        fx[i] = fz[i] = 0.0
+        if grip[i] > 0.0:
+            a, b = nx[i], nz[i]
+            along_x = a * bxx[i] + b * bxz[i]
+            along_z = a * bxz[i] + b * bzz[i]
+            traction = (a * (sxx[i] - pressure[i]) + b * sxz[i]) * along_x
+            traction += (a * sxz[i] + b * (szz[i] - pressure[i])) * along_z
+            held = grip[i] * traction
+            volume = mass[i] / density[i]
+            if traction >= 0.0:
+                taken -= volume * held * wall_rate[i]
+                grip[i] = 0.0
+                continue
+            held /= along_x * a + along_z * b
+            share = held * max(distance[i], 0.0) * ring[i]
+            mxx[i] -= a * share * along_x
+            mxz[i] -= a * share * along_z
+            mzx[i] -= b * share * along_x
+            mzz[i] -= b * share * along_z
+            px, pz = -held * volume * a, -held * volume * b
+            if friction > 0.0:
+                slip = -u[i] * b + (w[i] - speed_z) * a
+                drag = friction * held * volume * slip / (abs(slip) + SLIP_SPEED)
+                px -= drag * b
+                pz += drag * a
+                lost -= drag * slip
+            fx[i] = px
+            fz[i] = pz
+            force -= pz
     energy[0] = taken
     energy[1] = lost
     return force

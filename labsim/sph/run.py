@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..records import FloatArray
 from . import particles as rows
-from ._jit import solver_hash
-from .materials.porous_dust import gas_energy
+from .materials import find_law, solver_hash
+from .reconstruction import differentiate_field, share_above
 from .setting import DropSetting
 
 CURVE_POINTS = 500  # kept of the curve, at most
@@ -60,8 +61,25 @@ class DropRun:
         return self.particles.r.size * self.steps / self.wall
 
     def compacted_volume(self, threshold: float) -> float:
-        """Volume of dust with a filling factor above ``threshold``, m³ (planar: m²)."""
-        return float(self.particles.volume[self.particles.filling_factor > threshold].sum())
+        """Volume of dust with a filling factor above ``threshold``, m³ (planar: m²): φ is linear inside each particle's cell."""
+        across_r, across_z = self._across_cells
+        share = share_above(self.particles.filling_factor - threshold, across_r, across_z)
+        return float(np.sum(share * self.particles.volume))
+
+    @cached_property
+    def _across_cells(self) -> tuple[FloatArray, FloatArray]:
+        """What φ changes by from the middle of each particle's cell to its edges."""
+        p = self.particles
+        axisymmetric = self.setting.geometry == "axisymmetric"
+        area = p.volume / (2 * math.pi * np.abs(p.r)) if axisymmetric else p.volume
+        h = self.setting.numerics.smoothing * self.setting.spacing
+        by_r, by_z = differentiate_field(p.r, p.z, area, p.filling_factor, h, axisymmetric)
+        half = 0.5 * np.sqrt(area)
+        return half * by_r, half * by_z
+
+    def energy_share(self, sink: str) -> float:
+        """What went into ``sink``, a name in ``energies``, of the kinetic energy at contact and what gravity gave."""
+        return self.energies[sink] / (self.energies["kinetic_at_contact"] + self.energies["gravity"])
 
     def depth_at(self, time: FloatArray) -> FloatArray:
         """Depth (m) at times (s) from contact; before it free fall without gravity, after the run's end at rest."""
@@ -82,15 +100,14 @@ def make_run(
     seconds: float,
 ) -> DropRun:
     """Book momentum and energy, thin the curve, and pack the record."""
+    law = find_law(setting.material.law)
     planar = setting.geometry == "planar"
     stop = stop_step if stop_step is not None else len(log) - 1
     body_mass = setting.projectile.mass / per_unit
     warnings = []
     if stop_step is None:
         warnings.append(f"did not stop within {setting.duration * 1e3:.3g} ms")
-    clamped = np.mean(at_stop[rows.DENSITY] / setting.monomer_density > setting.material.phi_2 - 0.002)
-    if clamped > 1e-3:
-        warnings.append(f"φ was at its upper limit φ2 in {100 * clamped:.2g} % of the particles")
+    warnings += law.find_warnings(setting, *rows.name_rows(setting, at_stop))
 
     brought = body_mass * setting.impact_speed
     momentum = float(np.sum(at_end[rows.MASS] * at_end[rows.W])) - body_mass * log[-1, 2]
@@ -102,14 +119,13 @@ def make_run(
     body_kinetic = 0.5 * body_mass * log[-1, 2] ** 2
     fallen = body_mass * log[-1, 1] - float(np.sum(mass * (at_end[rows.Z] - at_start[rows.Z])))
     stress_work = float(np.sum(mass * at_end[rows.WORK]))
+    exchanged = float(np.sum(mass * at_end[rows.EXCHANGED]))
     elastic = float(np.sum(mass * (at_end[rows.ELASTIC] - at_start[rows.ELASTIC])))
-    gas = float(
-        np.sum(
-            mass
-            * gas_energy(
-                at_end[rows.DENSITY], at_end[rows.INITIAL], setting.pore_gas, setting.monomer_density
-            )
-        )
+    # only some laws let gas be trapped
+    gas = (
+        float(np.sum(mass * law.gas_energy(setting, rows.name_rows(setting, at_end)[0])))
+        if setting.pore_gas
+        else 0.0
     )
     energies = {
         "kinetic_at_contact": kinetic_0,
@@ -117,7 +133,8 @@ def make_run(
         "kinetic": dust_kinetic + body_kinetic,
         "elastic": elastic,
         "gas": gas,
-        "plastic": stress_work - elastic - gas,
+        "plastic": stress_work - elastic - gas - exchanged,
+        "exchange": exchanged,
         "viscous": float(log[-1, 6]),
         "friction": float(log[-1, 7]),
         "outside": float(log[-1, 9]),
@@ -125,7 +142,17 @@ def make_run(
     }
     spent = sum(
         energies[k]
-        for k in ("kinetic", "elastic", "gas", "plastic", "viscous", "friction", "outside", "contact")
+        for k in (
+            "kinetic",
+            "elastic",
+            "gas",
+            "plastic",
+            "exchange",
+            "viscous",
+            "friction",
+            "outside",
+            "contact",
+        )
     )
     energy_error = (kinetic_0 + energies["gravity"] - spent) / kinetic_0
     viscous_share = float(log[stop, 6]) / (kinetic_0 + body_mass * setting.gravity * log[stop, 1])
@@ -170,6 +197,6 @@ def make_run(
         energy_error=float(energy_error),
         energies={key: value * per_unit for key, value in energies.items()},
         viscous_share=viscous_share,
-        solver=solver_hash(),
+        solver=solver_hash(setting.material.law),
         warnings=tuple(warnings),
     )

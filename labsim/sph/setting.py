@@ -8,6 +8,7 @@ from typing import Literal
 
 from ..errors import SimulationError
 from ..records import STANDARD_GRAVITY, Material, Projectile
+from .materials import find_law
 
 LOOSEST = 0.005  # of φ over φ1, that a gradient leaves
 LEAST_GRADED = 3.0  # tip radii that a falling φ0 must fall through before it stays as it is
@@ -18,7 +19,7 @@ class Numerics:
     """Choices of the discretisation; docs/numerics.md gives the measured effect of each on the depth."""
 
     smoothing: float = 1.2  # smoothing length in spacings; the kernel ends at twice that
-    alpha: float = 0.5  # artificial viscosity, on what two particles' own velocity gradients leave of a jump
+    alpha: float = 0.3  # artificial viscosity, on what two particles' own velocity gradients leave of a jump
     beta: float = 0.0  # its quadratic part
     affine: float = 1.0  # share of the linear velocity field taken out of the jump; 0 is Monaghan's viscosity
     front: float = (
@@ -28,8 +29,9 @@ class Numerics:
         0.0  # of the tension of a pair, holds it apart; for bodies without a tensile limit, dust has one
     )
     courant: float = 0.9  # time step in smoothing lengths over the largest sound speed
-    contact_gap: float = 0.5  # reach of the rigid surface in spacings, shrinking with the dust beside it
-    contact_stiffness: float = 0.3  # in units of mass (sound speed / spacing)^2
+    exchange: float = (
+        2.0  # diffusivity of the compaction where dust is being compacted, in h² times that rate
+    )
     skin: float = 0.3  # of the neighbour list, in smoothing lengths
 
 
@@ -76,7 +78,7 @@ class DropSetting:
         of 1300 Pa or more, deeper in softer dust with the third root of its strength. It only sizes boxes."""
         radius = self.projectile.tip_radius
         area = 2 * radius if self.geometry == "planar" else math.pi * radius**2
-        strength = max(self.material.p_m * min(self.material.shear_factor, 1.0), 1.0)
+        strength = max(find_law(self.material.law).resistance(self), 1.0)
         # softer dust lets it through to where the bottom would be felt
         return float(
             7e-4 * self.projectile.mass * self.impact_speed / area * max(1.0, 1300.0 / strength) ** (1 / 3)
@@ -87,10 +89,10 @@ class DropSetting:
         """Width (half width in r-z) and depth of the dust that is simulated, m, whole numbers of spacings."""
         radius = self.projectile.tip_radius
         planar = self.geometry == "planar"
-        width = self.width if self.width is not None else (16 * radius if planar else 6 * radius)
-        depth = (
-            self.depth if self.depth is not None else max(6 * radius, 3 * radius + 1.5 * self.expected_depth)
-        )
+        width = self.width if self.width is not None else (16 * radius if planar else 4 * radius)
+        least = 6 * radius if planar else 5 * radius
+        spare = least - 3 * radius  # below what is expected to be reached
+        depth = self.depth if self.depth is not None else max(least, spare + 1.5 * self.expected_depth)
         cells = 2 * round(width / self.spacing / 2) if planar else round(width / self.spacing)
         return cells * self.spacing, round(depth / self.spacing) * self.spacing
 
@@ -108,7 +110,7 @@ def check_setting(setting: DropSetting) -> None:
     def refuse(key: str, message: str) -> None:
         raise SimulationError("simulation", key, message)
 
-    material, projectile = setting.material, setting.projectile
+    law, projectile = find_law(setting.material.law), setting.projectile
     for key in ("impact_speed", "filling_factor", "monomer_density", "spacing", "duration"):
         value = getattr(setting, key)
         if not (math.isfinite(value) and value > 0):
@@ -128,23 +130,14 @@ def check_setting(setting: DropSetting) -> None:
             f"{setting.spacing:.3g} m does not resolve a tip of {projectile.tip_radius:.3g} m; "
             f"use {projectile.tip_radius / 4:.3g} m or less",
         )
-    low, high = material.phi_1, material.phi_2
-    reachable = [setting.filling_factor, setting.filling_factor + setting.crust_excess]
-    graded = min(setting.extent[1], setting.graded_depth)
-    reachable.append(setting.filling_factor + setting.filling_gradient * graded)
-    for phi in reachable:
-        if not low < phi < high:
-            refuse("filling_factor", f"{phi:.4g} lies outside ({low:.4g}, {high:.4g}), where Σ(φ) is defined")
+    law.check(setting, refuse)
     if setting.graded_depth < LEAST_GRADED * projectile.tip_radius:
         refuse(
             "filling_gradient",
             f"{setting.filling_gradient:.4g} per m leaves no strength {setting.graded_depth * 1e3:.3g} mm down, where "
             f"the projectile acts; at least {LEAST_GRADED:g} tip radii must lie above that",
         )
-    if not material.p_m > 0:
-        refuse("material.p_m", f"is {material.p_m!r} Pa; it must be positive")
-    stiffness = material.bulk_modulus * (1 + 4 / 3 * material.shear_to_bulk)
-    sound = math.sqrt(stiffness / (setting.monomer_density * setting.filling_factor))
+    sound = law.sound_speed(setting)
     if setting.impact_speed >= sound:
         refuse(
             "impact_speed",

@@ -54,6 +54,10 @@ def test_simulate_writes_what_the_contract_says(tmp_path: Path, capsys: pytest.C
         "penetration_depth_m stopping_time_s particles steps wall_s updates_per_s momentum_error energy_error"
     )
     assert set(keys.split()) <= set(summary) and printed == summary
+    shares = ("contact_energy_share", "viscous_energy_share", "exchange_energy_share")
+    assert all(abs(summary[key]) < 0.2 for key in shares)
+    volumes = [summary["compacted_volume_m3"][phi] for phi in ("0.17", "0.20", "0.22")]
+    assert 0.15 < summary["filling_factor_max"] < 0.4 and sorted(volumes, reverse=True) == volumes
     assert summary["setting"]["material"]["bulk_modulus"] == 4500.0
     curve = pd.read_csv(folder / "curve.csv")
     assert list(curve.columns) == ["time_s", "depth_m", "velocity_m_s", "force_N_m"]

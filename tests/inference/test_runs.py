@@ -78,7 +78,7 @@ def test_keys_depend_on_every_value_and_on_the_solver(monkeypatch: pytest.Monkey
     assert len(keys) == 5
     assert canonical(base.replace(gravity=0)) == canonical(base)  # 0 is 0.0
     before = make_key(base)
-    monkeypatch.setattr(run_file, "solver_hash", lambda: "another solver")
+    monkeypatch.setattr(run_file, "solver_hash", lambda law: "another solver")
     assert make_key(base) != before
 
 
@@ -145,7 +145,7 @@ def test_the_index_is_made_again_from_the_files(tmp_path: Path) -> None:
 def test_pruning_removes_runs_of_other_solvers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = RunStore(tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(run_file, "solver_hash", lambda: "old")
+        patch.setattr(run_file, "solver_hash", lambda law: "old")
         store.get_many([small_drop()], workers=1)
     store.get_many([small_drop()], workers=1)
     assert store.new == 2 and store.prune() == 1

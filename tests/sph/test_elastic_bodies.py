@@ -12,6 +12,8 @@ from labsim.records import Projectile
 from labsim.sph import DropSetting, Numerics, simulate
 from labsim.sph import particles as rows
 from labsim.sph.bodies import elastic_material, evolve_body, fill_block, place_rings, set_body
+from labsim.sph.materials import porous_dust as dust
+from labsim.sph.particles import fill_at_rest
 
 
 def oscillate_plate(thickness_in_particles):
@@ -20,6 +22,7 @@ def oscillate_plate(thickness_in_particles):
     bulk, shear = young / (3 * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     spacing = thickness / thickness_in_particles
     setting = set_body(elastic_material(bulk, shear / bulk), spacing, 0.155, monomer_density=1000 / 0.15)
+    setting = setting.replace(numerics=Numerics(alpha=0.5))  # with a drop's 0.3 the period is 2.5 % longer
     free, clamped = round(length / spacing), 4
     state = fill_block(setting, free + clamped, thickness_in_particles)
     state[rows.X] -= clamped * spacing
@@ -131,38 +134,34 @@ def test_rigid_rotation():
 
 def test_stress_turns_with_the_body():
     """Jaumann's rate: after a quarter of a turn Sxx and Szz have changed places, the invariant is the same."""
-    from labsim.sph.materials import porous_dust as dust
-
-    material = elastic_material(45e3, 0.5)
-    strength, tension = dust.tabulate_strengths(material)
-    row = {
-        name: np.zeros(1) for name in "sxz pressure sound work compressive tensile zero lxx lzz vr".split()
-    }
-    sxx, szz, rho, one = np.array([100.0]), np.array([-40.0]), np.array([300.0]), np.ones(1)
+    setting = set_body(elastic_material(45e3, 0.5), 1e-4, 1.0)
+    s, own = rows.name_rows(setting, fill_at_rest(setting, np.ones(1), np.zeros(1), np.array([0.15])))
+    s.sxx[:], s.szz[:], s.lxz[:], s.lzx[:] = 100.0, -40.0, -0.5 * np.pi, 0.5 * np.pi
+    constants, tables = dust.make_constants(setting), dust.make_tables(setting)
     steps = 20000
     for _ in range(steps):
-        dust.update_stress(
-            0, 1, 1.0 / steps, False, True, (2000.0, 45e3, 4.0, 0.5, 1.0, 0.0, 1.0, 0.0), strength, tension,
-            one, row["vr"], row["lxx"], -0.5 * np.pi * one, 0.5 * np.pi * one, row["lzz"], rho, 0.15 * one, 0.15 * one,
-            sxx, szz, row["sxz"], row["pressure"], row["sound"], row["work"], row["compressive"], row["tensile"],
-        )  # fmt: skip
-    assert sxx[0] == pytest.approx(-40.0, abs=0.1)
-    assert szz[0] == pytest.approx(100.0, abs=0.1)
-    assert abs(row["sxz"][0]) < 0.1
+        dust.update(0, 1, 1.0 / steps, False, s, own, constants, tables)
+    assert s.sxx[0] == pytest.approx(-40.0, abs=0.1)
+    assert s.szz[0] == pytest.approx(100.0, abs=0.1)
+    assert abs(s.sxz[0]) < 0.1
 
 
 @pytest.mark.parametrize(
-    ("resolution", "within"), [(16, 0.08), pytest.param(32, 0.03, marks=pytest.mark.slow)]
+    ("resolution", "within"), [(16, 0.02), pytest.param(32, 0.01, marks=pytest.mark.slow)]
 )
 def test_sphere_on_elastic_half_space(resolution, within):
-    """Hertz: 1 mm glass bead at 0.65 m/s on K 300 kPa goes 0.0794 mm deep, contact lasts 0.359 ms."""
+    """1 mm glass bead at 0.65 m/s on K 300 kPa: Hertz says 0.0794 mm deep and 0.359 ms of contact, for small indentations.
+
+    This one is 0.16 radii: a Lagrangian mesh (benchmarks/lagrangian_mesh) converges to 4.2 % less depth and 2.6 % less time.
+    """
+    depth, time = (1 - 0.0425) * 7.94e-5, (1 - 0.0259) * 0.5 * 3.59e-4
     radius = 5e-4
     bead = Projectile("sphere", radius, 2540 * 4 / 3 * math.pi * radius**3)
     run = simulate(
         DropSetting(bead, 0.65, elastic_material(300e3, 0.5), gravity=0.0, spacing=radius / resolution,
                     width=6 * radius, depth=6 * radius, after_stop=0.0)
     )  # fmt: skip
-    print(f"R/dx {resolution}: depth {run.penetration_depth / 7.94e-5 - 1:+.2%}, time to stop "
-          f"{run.stopping_time / (0.5 * 3.59e-4) - 1:+.2%}, energy {run.energy_error:+.2%}")  # fmt: skip
-    assert run.penetration_depth == pytest.approx(7.94e-5, rel=within)
-    assert run.stopping_time == pytest.approx(0.5 * 3.59e-4, rel=within)
+    print(f"R/dx {resolution}: depth {run.penetration_depth / depth - 1:+.2%}, time to stop "
+          f"{run.stopping_time / time - 1:+.2%}, energy {run.energy_error:+.2%}")  # fmt: skip
+    assert run.penetration_depth == pytest.approx(depth, rel=within)
+    assert run.stopping_time == pytest.approx(time, rel=within)

@@ -95,7 +95,7 @@ def push_piston(material, speed, numerics, geometry):
 CASES = [
     ("planar", 0.0, 0.65, (1.5, 4.0, 1.5)),
     ("axisymmetric", 0.0, 1.0, (1.0, 2.0, 1.5)),
-    ("planar", 1.0, 0.30, (0.5, 1.5, 2.0)),
+    ("planar", 1.0, 0.30, (0.5, 1.5, 2.5)),
     ("axisymmetric", 1.0, 0.65, (2.0, 4.0, 4.0)),
 ]
 

@@ -108,8 +108,9 @@ def test_compaction_shock_with_the_viscosity_of_a_drop():
 def test_compaction_shock_with_fronts_looked_for(geometry, case):
     """Linear part of the velocity field left in the jump where the dust is pressed along one line, taken out everywhere else."""
     modulus, p_m, speed, phi, _, front = case
+    shock = Numerics(front=0.005, alpha=0.5)  # a drop's viscosity is less than a shock asks for
     profile, measured, inside, _ = push_piston(
-        modulus, p_m, speed, front, 0.5 * (phi + 0.15), geometry, Numerics(front=0.005)
+        modulus, p_m, speed, front, 0.5 * (phi + 0.15), geometry, shock
     )
     plateau = np.mean(profile[rows.DENSITY][inside]) / 2000.0
     print(f"{geometry} p_m {p_m:g} v {speed}: φ {plateau / phi - 1:+.2%} front {measured / front - 1:+.2%}")
@@ -139,6 +140,44 @@ def test_slow_uniaxial_compression(geometry):
     np.testing.assert_allclose(pressure, dust.compressive_strength(phi, material), rtol=0.01)
     expected = dust.compressive_strength(phi, material) + 2 / 3 * dust.shear_strength(phi, material)
     np.testing.assert_allclose(axial, expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("geometry", ["planar", "axisymmetric"])
+def test_closed_column_with_gas(geometry):
+    """The same press with gas in the pores that cannot leave: p is Σ(φ) and the excess of an isothermal gas, closed form."""
+    material, layers, speed, gas = Material(), 24, 0.06, 2000.0
+    setting = set_body(material, SPACING, 12e-3, geometry=geometry).replace(pore_gas=gas)
+    state = fill_block(setting, COLUMNS, layers)
+    layer = np.round(state[rows.Z] / SPACING - 0.5).astype(int)
+    wall = (layer < WALL) | (layer >= layers - WALL)
+    state[rows.W][layer >= layers - WALL] = -speed
+    end = evolve_body(setting, state, wall, planes=side_planes(geometry)).state
+    middle = np.abs(layer - layers / 2 + 0.5) < 5
+    phi = end[rows.DENSITY][middle] / 2000.0
+    assert phi.mean() > 0.2
+    excess = gas * ((1 - 0.15) / (1 - phi) - 1)
+    assert excess.mean() > 100
+    expected = dust.compressive_strength(phi, material) + excess
+    np.testing.assert_allclose(end[rows.PRESSURE][middle], expected, rtol=0.01)
+
+
+def test_a_moving_frame_changes_nothing():
+    """Galilean shift: a shock in dust that flies past, walls included, is the same shock."""
+    material = Material(p_m=1300.0, bulk_modulus=4500.0)
+    setting = set_body(material, SPACING, 4e-4)
+    state = fill_block(setting, 12, 40)
+    layer = np.round(state[rows.Z] / SPACING - 0.5).astype(int)
+    wall = layer < WALL
+    state[rows.W][wall] = 0.65
+    still = evolve_body(setting, state, wall).state
+    moving = state.copy()
+    moving[rows.U] += 1.5
+    moving[rows.W] -= 2.5
+    shifted = evolve_body(setting, moving, wall).state
+    for row in (rows.DENSITY, rows.PRESSURE, rows.SXX, rows.SXZ):
+        scale = np.abs(still[row]).max()
+        np.testing.assert_allclose(shifted[row], still[row], atol=1e-9 * scale)
+    np.testing.assert_allclose(shifted[rows.W] + 2.5, still[rows.W], atol=1e-9)
 
 
 @pytest.mark.parametrize("modulus", [4.5e3, 300e3])
@@ -204,4 +243,5 @@ def test_column_under_gravity_stays_at_rest(geometry):
     free_fall = 9.81 * setting.duration
     assert max(fastest) < 1e-2 * free_fall
     assert np.abs(error).max() < 0.03
-    np.testing.assert_array_equal(result.state[rows.ZERO_STRESS], state[rows.ZERO_STRESS])
+    end, begin = (rows.name_rows(setting, each)[1].zero_stress for each in (result.state, state))
+    np.testing.assert_array_equal(end, begin)

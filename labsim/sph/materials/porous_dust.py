@@ -13,11 +13,19 @@ Two optional terms: Σ (1 + η ε̇ⁿ) with ε̇ the rate of compression, and t
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...records import FloatArray, Material
 from .._jit import compiled
+from ._parts import exponential
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..setting import DropSetting
+    from ..state import Rows
 
 REFERENCE_FILLING_FACTOR = 0.15  # where bulk_modulus is stated
 EDGE = 0.002  # distance in φ from the poles of Σ at which the table leaves the formula
@@ -77,22 +85,102 @@ def zero_stress_filling_factor(phi: FloatArray, pressure: FloatArray, material: 
     return x
 
 
+class State(NamedTuple):
+    """Rows that this law carries: φ0', and Σ and |T| at the particle's φ (Pa)."""
+
+    zero_stress: FloatArray
+    compressive: FloatArray
+    tensile: FloatArray
+
+
+class Constants(NamedTuple):
+    """The law in numbers, Pa and kg/m³."""
+
+    solid_density: float
+    bulk_modulus: float
+    bulk_exponent: float
+    shear_to_bulk: float
+    shear_factor: float
+    rate: float
+    rate_exponent: float
+    gas_pressure: float
+    extras: tuple[int, ...]  # empty: no rate term, no gas, exponent 4 of K. A type, so known to the compiler
+
+
+class Tables(NamedTuple):
+    """Σ and |T|, Pa, at TABLE_SIZE values of φ from 0 to TABLE_TOP."""
+
+    compressive: FloatArray
+    tensile: FloatArray
+
+
+def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -> tuple[State, FloatArray]:
+    """Own rows of dust at rest under an elastic pressure (Pa), and its sound speed (m/s)."""
+    material = setting.material
+    stiffness = bulk_modulus(phi, material)
+    sound = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / (phi * setting.monomer_density))
+    nothing = np.zeros(phi.size)
+    return State(zero_stress_filling_factor(phi, nothing + pressure, material), nothing, nothing), sound
+
+
+def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
+    """What dust at rest may carry without crushing, Pa."""
+    return 0.8 * compressive_strength(phi, setting.material)
+
+
+def resistance(setting: DropSetting) -> float:
+    """Strength (Pa) that decides how deep a projectile goes; it only sizes boxes."""
+    return setting.material.p_m * min(setting.material.shear_factor, 1.0)
+
+
+def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
+    """Refuse (key, reason) what lies outside the limits of the law."""
+    material = setting.material
+    low, high = material.phi_1, material.phi_2
+    reachable = [setting.filling_factor, setting.filling_factor + setting.crust_excess]
+    graded = min(setting.extent[1], setting.graded_depth)
+    reachable.append(setting.filling_factor + setting.filling_gradient * graded)
+    for phi in reachable:
+        if not low < phi < high:
+            refuse("filling_factor", f"{phi:.4g} lies outside ({low:.4g}, {high:.4g}), where Σ(φ) is defined")
+    if not material.p_m > 0:
+        refuse("material.p_m", f"is {material.p_m!r} Pa; it must be positive")
+
+
+def sound_speed(setting: DropSetting) -> float:
+    """Of compression waves in undisturbed dust, m/s."""
+    stiffness = setting.material.bulk_modulus * (1 + 4 / 3 * setting.material.shear_to_bulk)
+    return math.sqrt(stiffness / (setting.monomer_density * setting.filling_factor))
+
+
+def find_warnings(setting: DropSetting, s: Rows, own: State) -> list[str]:
+    """What a user should know of the state at the stop."""
+    clamped = np.mean(s.density / setting.monomer_density > setting.material.phi_2 - 0.002)
+    return (
+        [f"φ was at its upper limit φ2 in {100 * clamped:.2g} % of the particles"] if clamped > 1e-3 else []
+    )
+
+
+def make_constants(setting: DropSetting) -> Constants:
+    """The numbers of the law as the compiled update wants them."""
+    material = setting.material
+    plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
+    return Constants(
+        setting.monomer_density, material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk,
+        material.shear_factor, setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
+        () if plain else (1,),
+    )  # fmt: skip
+
+
+def make_tables(setting: DropSetting) -> Tables:
+    """What the compiled update looks up."""
+    return Tables(*tabulate_strengths(setting.material, setting.strength_shape))
+
+
 @compiled
 def _raise_to(ratio, gamma, fourth):
     """ratio ** gamma; the exponent of nearly every dust is 4 (``fourth``), and two products are far cheaper than a power."""
     return ratio * ratio * ratio * ratio if fourth else ratio**gamma
-
-
-@compiled
-def _exponential(y):
-    """e^y to 1e-14 for |y| < 1, without the library call that would keep a loop from being vectorised."""
-    y *= 0.125
-    e = 1.0 + y / 9.0
-    for k in (8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0):
-        e = 1.0 + e * y / k
-    e *= e
-    e *= e
-    return e * e
 
 
 @compiled
@@ -107,25 +195,35 @@ def solve_zero_stress(phi, pressure, k0, gamma, fourth):
 
 
 @compiled
-def update_stress(
-    low, high, dt, axisymmetric, plain, law, strength_table, tension_table, r, vr, lxx, lxz, lzx, lzz,
-    rho, phi_zero, phi_initial, sxx, szz, sxz, pressure, sound, work, compressive, tensile,
-):  # fmt: skip
+def update(low, high, dt, axisymmetric, s, own, constants, tables):
     """One step of the material for particles low..high-1: velocity gradient in, density, φ0' and stress out. Plastic state is
-    committed here, once per step. work: stress power spent so far, per mass; compressive, tensile: Σ and |T| of each particle.
+    committed here, once per step. exchange: growth of volume, 1/s, by exchange with neighbours. work: stress power spent so far,
+    per mass; exchanged: what of it pressure gave up in the exchange; crushing: rate at which φ0' grew, 1/s.
 
-    law: monomer density, K0, γ, shear_to_bulk, shear_factor, η and n of the rate term, gas pressure.
-    plain: no rate term, no gas, exponent 4 of K. Then the loop has no branch and no call, and is vectorised.
+    Without extras (no rate term, no gas, exponent 4 of K) the loop has no branch and no call, and is vectorised.
     """
-    solid_density, k0, gamma, shear_to_bulk, shear_factor, rate_eta, rate_n, gas_pressure = law
+    solid_density, k0, gamma = constants.solid_density, constants.bulk_modulus, constants.bulk_exponent
+    shear_to_bulk, shear_factor, gas_pressure = (
+        constants.shear_to_bulk,
+        constants.shear_factor,
+        constants.gas_pressure,
+    )
+    rate_eta, rate_n = constants.rate, constants.rate_exponent
+    plain = len(constants.extras) == 0
+    strength_table, tension_table = tables.compressive, tables.tensile
+    r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
+    phi_zero, compressive, tensile, phi_initial = own.zero_stress, own.compressive, own.tensile, s.initial
+    sxx, szz, sxz, pressure, sound = s.sxx, s.szz, s.sxz, s.pressure, s.sound
+    work, exchanged, crushing = s.work, s.exchanged, s.crushing
     inverse_step = (TABLE_SIZE - 1) / TABLE_TOP / solid_density
     third = 1.0 / 3.0
     hoops = 1.0 if axisymmetric else 0.0
     top = strength_table.size - 2
     inverse_solid = 1.0 / solid_density
+    per_dt = 1.0 / dt if dt > 0.0 else 0.0
     # three loops, because one that looks up a table cannot be vectorised
     for i in range(low, high):
-        rho[i] *= _exponential(-dt * (lxx[i] + lzz[i] + hoops * vr[i] / r[i]))
+        rho[i] *= exponential(-dt * (lxx[i] + lzz[i] + hoops * vr[i] / r[i] + exchange[i]))
     for i in range(low, high):
         position = rho[i] * inverse_step
         cell = np.uint64(min(max(int(position), 0), top))
@@ -138,7 +236,7 @@ def update_stress(
         hoop = hoops * vr[i] / r[i]
         div = lxx[i] + lzz[i] + hoop
         rho_new = rho[i]
-        rho_old = rho_new / _exponential(-div * dt)
+        rho_old = rho_new / exponential(-(div + exchange[i]) * dt)
         phi = rho_new * inverse_solid
         strength, tension = compressive[i], tensile[i]
         p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
@@ -154,6 +252,7 @@ def update_stress(
         elif p != trial:
             x = solve_zero_stress(phi, p, k0, gamma, plain)
         k = k0 * _raise_to(x * (1.0 / 0.15), gamma, plain)
+        crushing[i] += 0.2 * (max(x - phi_zero[i], 0.0) / phi_zero[i] * per_dt - crushing[i])
         phi_zero[i] = x
         shear = shear_to_bulk * k
         exx = lxx[i] - div * third
@@ -186,13 +285,13 @@ def update_stress(
                 + (h_old + h) * (hoop - div * third)
             ) / (rho_old + rho_new)
         )  # fmt: skip
+        exchanged[i] += dt * (p_old + total) * exchange[i] / (rho_old + rho_new)
 
 
-def elastic_energy(
-    density: FloatArray, zero_stress: FloatArray, sxx: FloatArray, szz: FloatArray, sxz: FloatArray,
-    material: Material, monomer_density: float,
-) -> FloatArray:  # fmt: skip
+def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
     """Elastic energy held per mass, J/kg: of the volume between φ0' and φ, and of the deviatoric stress."""
+    material, monomer_density = setting.material, setting.monomer_density
+    density, zero_stress, sxx, szz, sxz = s.density, own.zero_stress, s.sxx, s.szz, s.sxz
     k = bulk_modulus(zero_stress, material)
     ratio = density / (monomer_density * zero_stress)
     shape = sxx**2 + szz**2 + (sxx + szz) ** 2 + 2.0 * sxz**2
@@ -200,14 +299,13 @@ def elastic_energy(
     return volume + shape / (4.0 * material.shear_to_bulk * k * density)
 
 
-def gas_energy(
-    density: FloatArray, initial: FloatArray, gas_pressure: float, monomer_density: float
-) -> FloatArray:
+def gas_energy(setting: DropSetting, s: Rows) -> FloatArray:
     """Energy held per mass, J/kg, by trapped gas (isothermal) since the pores were as at ``initial`` φ: all of it comes back.
 
     ∫ P0 ((1 - φi)/(1 - φ) - 1) dφ/(ρs φ²) from φi to φ.
     """
-    phi = density / monomer_density
+    initial, gas_pressure, monomer_density = s.initial, setting.pore_gas, setting.monomer_density
+    phi = s.density / monomer_density
 
     def primitive(at: FloatArray) -> FloatArray:
         return (1.0 - initial) * (np.log(at / (1.0 - at)) - 1.0 / at) + 1.0 / at

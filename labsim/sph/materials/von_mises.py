@@ -1,0 +1,139 @@
+"""Cohesive matter that flows at constant volume (undrained clay, metal): linear elastic, von Mises yield, no pull beyond a limit.
+
+    p = K (ρ/ρ0 - 1) ≥ -tension,  √(3 J2) ≤ 2 cohesion,  elastic shear with Jaumann's rate and radial return
+
+Hill (1950), The Mathematical Theory of Plasticity. ``cohesion`` is half the strength in triaxial compression (undrained shear
+strength), so simple shear yields at 2/√3 of it. Where p would fall below -tension the matter opens: ρ0 follows.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from labsim.records import FloatArray
+from labsim.sph._jit import compiled
+from labsim.sph.materials._parts import Parameter, exponential, read_parameters, refuse_terms
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from labsim.sph.setting import DropSetting
+    from labsim.sph.state import Rows
+
+PARAMETERS = (
+    Parameter("cohesion", "Pa", 1e-3, 1e9, 5e3, "soft clay, undrained"),
+    Parameter("shear_modulus", "Pa", 1.0, 1e11, 5e5, "rigidity 100 of soft clay"),
+    Parameter("bulk_modulus", "Pa", 1.0, 1e12, 5e6, "ten times shear: Poisson's ratio 0.45"),
+    Parameter("tension", "Pa", 0.0, 1e12, 1e12, "none: holds together"),
+)
+CALIBRATED = "cohesion"
+
+
+class State(NamedTuple):
+    reference: FloatArray  # ρ0, kg/m³
+
+
+class Constants(NamedTuple):
+    cohesion: float
+    shear_modulus: float
+    bulk_modulus: float
+    tension: float
+
+
+class Tables(NamedTuple):
+    """This law looks nothing up."""
+
+    none: FloatArray
+
+
+def make_constants(setting: DropSetting) -> Constants:
+    return Constants(*read_parameters(setting, PARAMETERS))
+
+
+def make_tables(setting: DropSetting) -> Tables:
+    return Tables(np.zeros(1))
+
+
+def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -> tuple[State, FloatArray]:
+    """Own rows at rest under a pressure (Pa), and the sound speed (m/s)."""
+    law = make_constants(setting)
+    density = phi * setting.monomer_density
+    sound = np.sqrt((law.bulk_modulus + 4 / 3 * law.shear_modulus) / density)
+    return State(density / (1 + pressure / law.bulk_modulus)), sound
+
+
+def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
+    return np.full_like(phi, np.inf)
+
+
+def resistance(setting: DropSetting) -> float:
+    return 8.0 * make_constants(setting).cohesion  # about what a deep tip meets
+
+
+def sound_speed(setting: DropSetting) -> float:
+    return float(start(setting, np.array([setting.filling_factor]), 0.0)[1][0])
+
+
+def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
+    make_constants(setting)
+    refuse_terms(setting)
+
+
+def find_warnings(setting: DropSetting, s: Rows, own: State) -> list[str]:
+    return []
+
+
+def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
+    """Per mass, J/kg."""
+    law = make_constants(setting)
+    ratio = s.density / own.reference
+    shape = s.sxx**2 + s.szz**2 + (s.sxx + s.szz) ** 2 + 2.0 * s.sxz**2
+    volume = law.bulk_modulus / own.reference * (np.log(ratio) + 1.0 / ratio - 1.0)
+    return volume + shape / (4.0 * law.shear_modulus * s.density)
+
+
+@compiled
+def update(low, high, dt, axisymmetric, s, own, constants, tables):
+    """One step of particles low..high-1: velocity gradient in, density, stress, sound and the book of work out."""
+    r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
+    sxx, szz, sxz, pressure, sound, work = s.sxx, s.szz, s.sxz, s.pressure, s.sound, s.work
+    exchanged, crushing, reference = s.exchanged, s.crushing, own.reference
+    bulk, shear, tension = constants.bulk_modulus, constants.shear_modulus, constants.tension
+    yield2 = 4.0 * constants.cohesion * constants.cohesion
+    third = 1.0 / 3.0
+    hoops = 1.0 if axisymmetric else 0.0
+    for i in range(low, high):
+        hoop = hoops * vr[i] / r[i]
+        div = lxx[i] + lzz[i] + hoop
+        rho_old = rho[i]
+        rho_new = rho_old * exponential(-dt * (div + exchange[i]))
+        p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
+        trial = bulk * (rho_new / reference[i] - 1.0)
+        p = max(trial, -tension)
+        reference[i] = rho_new / (1.0 + p / bulk) if p != trial else reference[i]
+        exx = lxx[i] - div * third
+        ezz = lzz[i] - div * third
+        exz = 0.5 * (lxz[i] + lzx[i])
+        spin = 0.5 * (lxz[i] - lzx[i])
+        a = sxx_old + dt * (2.0 * shear * exx + 2.0 * spin * sxz_old)
+        c = szz_old + dt * (2.0 * shear * ezz - 2.0 * spin * sxz_old)
+        b = sxz_old + dt * (2.0 * shear * exz + spin * (szz_old - sxx_old))
+        q2 = 1.5 * (a * a + c * c + (a + c) * (a + c)) + 3.0 * b * b
+        f = math.sqrt(yield2 / max(q2, yield2))
+        a *= f
+        b *= f
+        c *= f
+        rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
+        sound[i] = math.sqrt((bulk * rho_new / reference[i] + 4.0 * third * shear) / rho_new)
+        crushing[i] = 0.0  # nothing is crushed, so nothing is exchanged
+        h_old, h = -(sxx_old + szz_old), -(a + c)
+        work[i] += (
+            dt * (
+                -(p_old + p) * div + (sxx_old + a) * exx + (szz_old + c) * ezz + 2.0 * (sxz_old + b) * exz
+                + (h_old + h) * (hoop - div * third)
+            ) / (rho_old + rho_new)
+        )  # fmt: skip
+        exchanged[i] += dt * (p_old + p) * exchange[i] / (rho_old + rho_new)
