@@ -107,7 +107,16 @@ def test_a_pair_must_earn_its_second_effect():
         )
         found = dict(verdict.probabilities)
         prior = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4 / (PRIOR_PAIRS / 6)
-        assert found["a", "b"] / found["c",] == pytest.approx(math.exp(gain / TEMPERATURE) / prior)
+        assert found["c",] == pytest.approx(
+            found["a",]
+        )  # what explains as much as a part of the pair stands with it
+        better = judge(
+            fake_fit((), 0.0), [single, fake_fit(("a", "b"), 50.0 + gain)], -1.0, catalogue, {"c": 51.0}
+        )
+        found_better = dict(better.probabilities)
+        assert found_better["a", "b"] / found_better["c",] == pytest.approx(
+            math.exp((gain - 1.0) / TEMPERATURE) / prior
+        )
         return found["a", "b"] / found["a",] * prior
 
     assert ratio(6.0) == pytest.approx(math.exp(6.0 / NESTED))
