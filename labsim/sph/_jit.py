@@ -70,4 +70,4 @@ def compiled_loop(function: Callable) -> Callable:
 
 def loop_folder() -> Path:
     """Where copies of the loop with a law in them lie, beside their compiled code."""
-    return Path(numba.config.CACHE_DIR)  # type: ignore[attr-defined] / "loops"
+    return Path(numba.config.CACHE_DIR) / "loops"  # type: ignore[attr-defined]

@@ -90,6 +90,6 @@ def test_dust_softer_than_the_range_says_is_not_counted(count, monkeypatch, room
     """What p_m makes up for leaves nothing, wherever its stated range ends; within the range alone it would."""
     monkeypatch.setattr(strength, "ROOM", room)
     narrow = StrengthCount(
-        replace(count.campaign, p_m_range=(1600.0, 6000.0)), count.store, count.truth, reference=0.0
+        replace(count.campaign, p_m_range=(1800.0, 6000.0)), count.store, count.truth, reference=0.0
     )
     assert (narrow.measure(Hidden()) > 5.0) == stopped
