@@ -42,11 +42,8 @@ from labsim.records import Campaign, FloatArray
 DROPS = "D02,D03,D05,D06,D07,D13,D14"  # rods of 0.5 mm and of 1.5 mm radius
 KINDS = ("material", "sample", "contact", "measurement")
 SIGMAS = (12.0, 20.0)
-WEAKER = (
-    12.0,
-    8.0,
-    5.0,
-)  # asked for in turn where an effect's limits allow no more: p_m makes up for much of a friction
+# asked for in turn where an effect's limits allow no more: p_m makes up for much of a friction
+WEAKER = (12.0, 8.0, 5.0)
 MOST_WRONG, LEAST_FOUND = 1, 5
 
 # Rods that end in the film, that go through it and that do not reach it ask for different p_m; undisturbed dust shows nothing.

@@ -16,6 +16,7 @@ from labsim.campaign import read_campaign
 from labsim.cli import main
 from labsim.cli import new as new_command
 from labsim.errors import CampaignError
+from labsim.inference.observe import observe_drops
 from labsim.inference.surface_rows import doubt_surface_rows
 
 P01 = Path(__file__).parents[1] / "data" / "campaigns" / "p01"
@@ -285,7 +286,7 @@ def test_a_surface_row_that_the_rows_contradict_is_named_with_theirs(
     assert len(odd) == 1 and odd[0].startswith("D05: ")
     row, sigma = map(float, re.findall(r"row ([\d.]+) ± ([\d.]+) px", odd[0])[0])
     assert abs(row - 297.53) < 3 * sigma and sigma < 2
-    assert doubt_surface_rows(read_campaign(campaign)) == [f"drop {odd[0]}"], (
+    assert doubt_surface_rows(observe_drops(read_campaign(campaign))[0]) == [f"drop {odd[0]}"], (
         "calibrate and diagnose say it too"
     )
 

@@ -99,7 +99,9 @@ def finish_many(
     lines = [line(name, each) for name, each in summary["items"].items()]
     lines += [f"{name}: error: {text}" for name, text in summary["failed"].items()]
     lines.append(
-        f"{summary['measured_new']} measured, {summary['reused']} were there; written to {file.parent}"
+        f"{summary['measured_new']} measured"
+        + (f", {summary['reused']} from before" if summary["reused"] else "")
+        + f"; written to {options.shorten_path(file.parent)}"
     )
     options.write_json(file, summary)
     options.finish(summary, "\n".join(lines), as_json=as_json, quiet=quiet)

@@ -14,6 +14,7 @@ from .. import video
 from ..errors import LabsimError
 from ..records import STANDARD_GRAVITY, DecelerationCurve, Measured, Track
 from ..tracking import Request, Tracked, make_camera
+from . import options
 
 
 def write_files(folder: Path, tracked: Tracked) -> list[str]:
@@ -163,7 +164,7 @@ def tell(summary: dict[str, Any], curve: DecelerationCurve | None, folder: Path,
         else:
             lines.append(f"  {'pixel size':22s} {1e6 * pixel.value:.3f} µm ({where}, without an uncertainty)")
     lines += [f"warning: {text}" for text in summary["warnings"]]
-    lines.append(f"written to {folder}: {', '.join(written)}")
+    lines.append(f"written to {options.shorten_path(folder)}: {', '.join(written)}")
     return "\n".join(lines)
 
 

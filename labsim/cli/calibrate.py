@@ -73,7 +73,9 @@ def calibrate(
         else:
             found = calibrate_figures(read, RunStore(store), use, planar_correction, bulk_modulus, settings)
             summary, lines = write_calibration(found, folder)
-    options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
+    options.finish(
+        summary, f"{lines}\n\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+    )
 
 
 def write_calibration(found: SummaryCalibration, folder: Path) -> tuple[dict, str]:

@@ -109,7 +109,12 @@ def ct(
     given = {"cell": cell, "guard": guard, "sample": sample_filling_factor}
     with show_progress(quiet) as progress:
         summary, lines = reduce_record(record, target, given, progress)
-    finish({**summary, "out": str(target)}, f"{lines}\nwritten to {target}", as_json=as_json, quiet=quiet)
+    finish(
+        {**summary, "out": str(target)},
+        f"{lines}\nwritten to {options.shorten_path(target)}",
+        as_json=as_json,
+        quiet=quiet,
+    )
 
 
 def _complete(scan: Path, stated: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:

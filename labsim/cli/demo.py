@@ -49,7 +49,7 @@ def demo(
     )
     options.finish(
         summary,
-        f"{calibration_lines(calibration)}\n\n{lines}\n\n{counted}; written to {folder}:\n{made}",
+        f"{calibration_lines(calibration)}\n\n{lines}\n\n{counted}; written to {options.shorten_path(folder)}:\n{made}",
         as_json=as_json,
         quiet=quiet,
     )

@@ -49,7 +49,9 @@ def diagnose(
                 calibration, opened, workers=workers, scheduler=scheduler, progress=progress
             )
             summary, lines = write_diagnosis(found, folder)
-    options.finish(summary, f"{lines}\n\nwritten to {folder}", as_json=as_json, quiet=quiet)
+    options.finish(
+        summary, f"{lines}\n\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+    )
 
 
 def write_diagnosis(found: SummaryDiagnosis, folder: Path) -> tuple[dict, str]:

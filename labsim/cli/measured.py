@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +47,7 @@ def write_measured_calibration(found: Calibration, folder: Path) -> tuple[dict, 
     found.posterior.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
     figures.draw_posterior(found.posterior, folder / "corner.png")
     views, maps = _draw_fits(found, [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)], folder)
-    shutil.copyfile(folder / "drops.png", folder / "fit.png")
+    (folder / "drops.png").rename(folder / "fit.png")
     figures.draw_p_m([("calibrated", found.posterior)], folder / "posterior.png")
     write_calibration_page(found, summary, state_numerical_error(found.bench), views, maps, folder)
     return summary, campaign_calibration_lines(found)

@@ -93,7 +93,7 @@ speed_m_s = 0.8                     # at contact
 speed_sigma_m_s = 0.05              # how well that speed is known
 
 [scan]
-slices = "slices"                   # folder of horizontal slices: TIFF, PNG or BMP, in the order of their names
+slices = "slices"                   # folder of slices (TIFF, PNG, BMP) in the order of their names, or a file: stack.tif, scan.h5
 voxel_um = 40.0                     # edge of a voxel
 first_slice = "top"                 # or "bottom": where the first file lies
 bits = 8                            # of the images, 8 or 16

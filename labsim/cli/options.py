@@ -119,6 +119,12 @@ def write_json(path: Path, summary: dict[str, Any], item: str | None = None) -> 
     return path
 
 
+def shorten_path(path: Path) -> str:
+    """As seen from the current directory, where it lies in there."""
+    here = Path.cwd().resolve()
+    return str(path.relative_to(here) if here in path.parents else path)
+
+
 def finish(summary: dict[str, Any], lines: str, *, as_json: bool, quiet: bool) -> None:
     """Last words of a command: JSON where asked for, otherwise the lines a person reads."""
     if as_json:

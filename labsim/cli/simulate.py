@@ -109,7 +109,9 @@ def simulate(
 
         draw_movie(min(runs, key=lambda each: each.setting.spacing), folder / "run.mp4")
     lines = "\n".join([lines, *unseen])
-    options.finish(summary, f"{lines}\nwritten to {folder}", as_json=as_json, quiet=quiet)
+    options.finish(
+        summary, f"{lines}\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+    )
 
 
 def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:

@@ -19,6 +19,7 @@ from ..inference.calibrate import (
 )
 from ..inference.drop_terms import Terms
 from ..inference.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
+from ..inference.free_fall import doubt_scales
 from ..inference.measure import Measurements, measure
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
@@ -194,7 +195,7 @@ def diagnose_campaign(
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
     if found.p_value < REJECTED:
-        warnings += doubt_surface_rows(campaign)
+        warnings += doubt_surface_rows(seen.drops)
     if found.predicted < PREDICTED:
         warnings.append(
             f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not predict "
@@ -214,6 +215,7 @@ def diagnose_campaign(
     doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
     if best is not nominal:
         doubts += [f"with {' + '.join(best.hypothesis)}: {text}" for text in warn_of_range(bench, best)]
+    doubts += doubt_scales(seen.drops)
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},
         confusable=list_confusable(found.screening),

@@ -80,7 +80,7 @@ def judge(
         behind = [
             most - (most - part) / NESTED - (part - above) / TEMPERATURE for part in nested if part >= above
         ]
-        tempered = min(tempered, *behind) if behind else tempered
+        tempered = min([tempered, *behind])
         weight[hypothesis] = math.log(prior) + nominal.evidence + tempered + min(value, 0.0)
     if predicted < PREDICTED:
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))

@@ -18,6 +18,7 @@ from ..records import Campaign
 from .drop_terms import Terms
 from .error_sizes import integrate_sizes
 from .fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
+from .free_fall import doubt_scales
 from .measure import Measurements, measure
 from .open_workbench import open_workbench
 from .posterior import Posterior, sample
@@ -141,13 +142,13 @@ def calibrate(
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     scatter, sigma = estimate_scatter(bench, fit)
     p_value = goodness_of_fit(fit)
-    doubts = warn_of_range(bench, fit)
+    doubts = warn_of_range(bench, fit) + doubt_scales(bench.drops)
     if p_value < DOUBTFUL:
         doubts.append(
             f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
             "diagnose asks why"
         )
-        doubts += doubt_surface_rows(campaign)
+        doubts += doubt_surface_rows(bench.drops)
     return Calibration(
         campaign,
         bench,

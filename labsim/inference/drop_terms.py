@@ -31,9 +31,8 @@ class Terms:
     numerical_change: float = 0.03  # of what an effect changes of the depth, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
-    numerical_strength: float = (
-        0.04  # of ln p_m, common to all drops: what another code asks for (docs/inference.md)
-    )
+    # of ln p_m, common to all drops: what another code asks for (docs/inference.md)
+    numerical_strength: float = 0.04
     numerical_slope: float = 0.01  # of the depth, per e-fold of depth over tip radius, common to all drops
     heights: bool = True
 

@@ -11,28 +11,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MeasurementError
-from ..records import Campaign, Drop, FloatArray, Track
+from ..records import Campaign, DecelerationCurve, Drop, FloatArray, Track
 from ..video.curve import fit_deceleration
 from ..video.track_file import read_track
 
 MARGIN = 4  # frames kept after the depth has stopped growing
+# Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
+SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
 
 
 @dataclass(frozen=True)
 class ObservedDrop:
-    """One drop on the stated scales. time, depth, sigma : (n,) s, m, m; depth is positive below the stated surface."""
+    """One drop on the stated scales. time, depth : (n,) s, m; depth is positive below the stated surface; sigma : m.
+
+    track, curve : what they come from.
+    """
 
     drop: Drop
     time: FloatArray
     depth: FloatArray
     sigma: float
-    contact_time: float  # s, starting value
-    impact_speed: float  # m/s, starting value on the stated scales
     rejected: int
+    track: Track
+    curve: DecelerationCurve
 
     @property
     def name(self) -> str:
         return self.drop.name
+
+    @property
+    def contact_time(self) -> float:
+        """s, a starting value."""
+        return self.curve.contact_time.value
+
+    @property
+    def impact_speed(self) -> float:
+        """m/s on the stated scales, a starting value."""
+        return self.curve.impact_speed.value
 
     @property
     def pixel(self) -> float:
@@ -71,9 +86,9 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
         time=time[:last],
         depth=depth[:last],
         sigma=sigma_px * pixel,
-        contact_time=curve.contact_time.value,
-        impact_speed=curve.impact_speed.value,
         rejected=int(np.sum(good & ~curve.used & (curve.clock <= time[-1]))),
+        track=track,
+        curve=curve,
     )
 
 
@@ -88,7 +103,7 @@ def read_observed_track(drop: Drop) -> Track:
 
 
 def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
-    """Every drop that shows something, and one line for each that does not.
+    """Every drop that shows something; a line for each that does not, and for each thing that its track warns of.
 
     Raises MeasurementError where none does: the first one's.
     """
@@ -103,4 +118,11 @@ def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
             failures.append((drop.name, error))
     if failures and not seen:
         raise failures[0][1]
-    return seen, [f"drop {name} left out: {error}" for name, error in failures]
+    lines = [f"drop {name} left out: {error}" for name, error in failures]
+    lines += [
+        f"drop {drop.name}: {text}"
+        for drop in seen
+        for text in drop.curve.warnings
+        if not any(words in text for words in SAID_ELSEWHERE)
+    ]
+    return seen, lines

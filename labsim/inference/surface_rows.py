@@ -8,13 +8,12 @@ contact has no edge. Only a row that is off by several pixels is found.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
-from ..errors import MeasurementError
-from ..records import STANDARD_GRAVITY, Campaign, DecelerationCurve, Drop, Track
+from ..records import STANDARD_GRAVITY, DecelerationCurve, Drop, Track
 from ..video.contact_row import find_surface_row
-from ..video.curve import fit_deceleration
-from .observe import read_observed_track
+from .observe import ObservedDrop
 
 DOUBTED = 4.0  # standard deviations
 SCALE_SHARE = 0.01  # by which apparent gravity may be off before the pixel size is taken from it
@@ -52,17 +51,7 @@ def doubt_surface_row(drop: Drop, track: Track, curve: DecelerationCurve) -> str
     )
 
 
-def doubt_surface_rows(campaign: Campaign) -> list[str]:
-    """The same for every drop with a track file; videos are not tracked again for it."""
-    lines = []
-    for drop in campaign.drops:
-        if drop.record.kind != "track" or drop.record.path is None or drop.camera is None:
-            continue
-        try:
-            track = read_observed_track(drop)
-            doubt = doubt_surface_row(drop, track, fit_deceleration(track, drop.camera))
-        except MeasurementError:
-            continue  # left out with a warning of its own
-        if doubt is not None:
-            lines.append(f"drop {drop.name}: {doubt}")
-    return lines
+def doubt_surface_rows(drops: Sequence[ObservedDrop]) -> list[str]:
+    """The same for every drop."""
+    doubts = {seen.name: doubt_surface_row(seen.drop, seen.track, seen.curve) for seen in drops}
+    return [f"drop {name}: {doubt}" for name, doubt in doubts.items() if doubt is not None]

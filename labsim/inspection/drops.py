@@ -60,7 +60,7 @@ def _inspect_video(drop: Drop, size: str) -> Found:
             pass
     except LabsimError as trouble:
         return Found(drop.name, f"{size}: the video cannot be read", trouble=trouble)
-    line = f"{size}: video of {len(frames)} frames, not tracked yet (labsim track)"
+    line = f"{size}: video of {len(frames)} frames, its motion is not read here (labsim track)"
     return Found(
         drop.name, line, {"frames": len(frames)}, [text for text in frames.warnings if "truncated" in text]
     )

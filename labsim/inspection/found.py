@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import LabsimError
+from ..inference.free_fall import SMALL_SHARE
 from ..records import Measured
 
 ODD = 3.0  # standard deviations
-SMALL_SHARE = 0.01  # relative: what is smaller is not worth a word
 
 
 @dataclass

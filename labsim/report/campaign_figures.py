@@ -58,7 +58,7 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
             below.tick_params(labelsize=7)
             if k % columns == 0:
                 above.set_ylabel("depth (mm)", fontsize=8)
-                below.set_ylabel("left (µm)", fontsize=8)
+                below.set_ylabel("measured − fit (µm)", fontsize=8)
             below.set_xlabel("time since contact (ms)", fontsize=8)
             if k == 0:
                 above.legend(fontsize=7)
@@ -219,7 +219,8 @@ def draw_undisturbed(bench: Workbench, path: Path) -> Path:
     with new_figure(path, 6.4, 3.2) as figure:
         ax = figure.subplots()
         two = 2 * sample.filling_factor_sigma
-        ax.axhspan(sample.filling_factor - two, sample.filling_factor + two, color=GREY, alpha=0.25, lw=0)
+        low, high = sample.filling_factor - two, sample.filling_factor + two
+        ax.axhspan(low, high, color=GREY, alpha=0.25, lw=0, label="stated, 2σ")
         for dust, color in zip(bench.undisturbed, (BLUE, ORANGE, INK, GREY) * 20, strict=False):
             ax.errorbar(
                 dust.depth * 1e3,

@@ -47,6 +47,7 @@ def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
 
 def campaign_calibration_lines(found: Calibration) -> str:
     p_m = summarise(found.posterior.samples("p_m_Pa"))
+    drops, scans = len(found.bench.models), len(found.bench.scans)
     lines = [
         *_say_doubts(found),
         f"{found.campaign.name}: p_m = {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa "
@@ -56,7 +57,7 @@ def campaign_calibration_lines(found: Calibration) -> str:
         q = summarise(found.posterior.samples(name))
         lines.append(f"  {name} = {q['mean']:.4g} ± {q['sd']:.2g}")
     lines += [
-        f"  {len(found.bench.models)} drops, {len(found.bench.scans)} scans; χ² {found.fit.chi_square:.0f} for "
+        f"  {drops} drop{'s' * (drops != 1)}, {scans} scan{'s' * (scans != 1)}; χ² {found.fit.chi_square:.0f} for "
         f"{found.fit.points} data (p = {found.p_value:.2g})",
         f"  scatter of ln p_m from sample to sample {found.scatter:.3f} ± {found.scatter_sigma:.3f}",
         f"  R-hat {found.posterior.r_hat:.3f}, {found.posterior.ess:.0f} independent samples; "

@@ -60,7 +60,7 @@ def plot_drop(view: DropView) -> Spec:
         "hovermode": "x unified",
         "xaxis": {"title": {"text": "time since contact (ms)"}, "anchor": "y2", "zeroline": False, "hoverformat": ".3f"},
         "yaxis": {"title": {"text": "depth (mm)"}, "domain": [0.42, 1.0], "autorange": "reversed", "zeroline": True},
-        "yaxis2": {"title": {"text": "left (µm)"}, "domain": [0.0, 0.34], "zeroline": True},
+        "yaxis2": {"title": {"text": "measured − fit (µm)"}, "domain": [0.0, 0.34], "zeroline": True},
     }  # fmt: skip
     return {"data": data, "layout": layout}
 

@@ -30,7 +30,7 @@ def draw_map(scan_map: FillingMap, undisturbed: float, path: Path, title: str = 
     )
     top = np.nanpercentile(scan_map.sigma, 99)
     image = _show(axes[1], scan_map, scan_map.sigma, {"cmap": "magma", "vmin": 0.0, "vmax": top})
-    figure.colorbar(image, ax=axes[1], label="standard error of a cell", format="%.4f")
+    figure.colorbar(image, ax=axes[1], label="standard error of a cell")
     axes[1].set_title("error (the calibration's scale not included)")
     figure.savefig(path, dpi=110)
     plt.close(figure)

@@ -37,9 +37,8 @@ def _write_once(source: str, name: str) -> Path:
     """The file of that source; its time is that of all others of its name, for Numba knows compiled code by it."""
     for folder in (loop_folder(), None):
         try:
-            folder = folder or Path(
-                tempfile.mkdtemp(prefix="labsim")
-            )  # a cache folder that cannot be written
+            # the cache folder may be one that cannot be written
+            folder = folder or Path(tempfile.mkdtemp(prefix="labsim"))
             path = folder / f"{name}.py"
             if path.exists() and path.read_text(encoding="utf-8") == source:
                 return path

@@ -140,20 +140,7 @@ def make_run(
         "outside": float(log[-1, 9]),
         "contact": float(log[-1, 8]),
     }
-    spent = sum(
-        energies[k]
-        for k in (
-            "kinetic",
-            "elastic",
-            "gas",
-            "plastic",
-            "exchange",
-            "viscous",
-            "friction",
-            "outside",
-            "contact",
-        )
-    )
+    spent = sum(energies[sink] for sink in energies if sink not in ("kinetic_at_contact", "gravity"))
     energy_error = (kinetic_0 + energies["gravity"] - spent) / kinetic_0
     viscous_share = float(log[stop, 6]) / (kinetic_0 + body_mass * setting.gravity * log[stop, 1])
 

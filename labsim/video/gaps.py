@@ -80,9 +80,8 @@ def propose_moves(
     and the same with every repeated picture put in, not put in place of the next one.
     """
     spacing = float(np.median(np.diff(time)))
-    rows = np.where(
-        repeated | guess_spikes(row, sigma), np.nan, row
-    )  # a step to a spike is none of the projectile's
+    # a step to a spike is none of the projectile's
+    rows = np.where(repeated | guess_spikes(row, sigma), np.nan, row)
     missing, doubled = np.zeros(row.size), np.zeros(row.size)
     for index, count in find_gaps((time - time[0]) / spacing, rows, sigma, repeated):
         (missing if count > 0 else doubled)[index:] += count

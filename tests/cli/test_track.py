@@ -135,7 +135,7 @@ def test_a_table_beside_its_output(tmp_path, monkeypatch, capsys) -> None:
     assert run("fall.csv", *SCALES, "-o", "out") == 0
     assert run("fall.csv", *SCALES) == 0
     assert (tmp_path / "out/drop.json").is_file() and (tmp_path / "fall-track/drop.json").is_file()
-    assert f"written to {tmp_path / 'fall-track'}" in capsys.readouterr().out
+    assert "written to fall-track: " in capsys.readouterr().out
 
 
 def test_lengths_need_no_camera(tmp_path, monkeypatch, capsys) -> None:
