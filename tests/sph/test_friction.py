@@ -1,4 +1,4 @@
-"""Coulomb friction between the projectile and the dust: a block that slides under a flat carries μ times its pressure in shear."""
+"""Coulomb friction between projectile and dust: a block that slides under a flat carries μ times its pressure in shear."""
 
 import numpy as np
 import pytest

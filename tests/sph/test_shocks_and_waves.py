@@ -143,7 +143,7 @@ def test_slow_uniaxial_compression(geometry):
 
 
 def test_pressed_let_go_and_pressed_again():
-    """A body goes down its elastic line, K(φ0') and 4μ/3 in the axial stress, and comes back on it to Σ + 2Y/3 where it had left."""
+    """A body goes down its elastic line, K(φ0') and 4μ/3 in the axial stress, and comes back on it to Σ + 2Y/3."""
     material, layers = Material(), 24
     state = fill_block(set_body(material, SPACING, 1.0), COLUMNS, layers)
     layer = np.round(state[rows.Z] / SPACING - 0.5).astype(int)
@@ -152,12 +152,16 @@ def test_pressed_let_go_and_pressed_again():
     filling, axial = [], []
     for speed, duration in ((-0.06, 8e-3), (0.0, 1e-3), (3e-3, 8e-4), (-3e-3, 8e-4), (-0.03, 2e-3)):
         state[rows.W][layer >= layers - WALL] = speed
-        state = evolve_body(set_body(material, SPACING, duration), state, wall, planes=side_planes("planar")).state
+        state = evolve_body(
+            set_body(material, SPACING, duration), state, wall, planes=side_planes("planar")
+        ).state
         filling.append(np.mean(state[rows.DENSITY][middle]) / 2000.0)
         axial.append(np.mean((state[rows.PRESSURE] - state[rows.SZZ])[middle]))
     print("φ", np.round(filling, 5), "axial stress", np.round(axial, 2))
     pressed, rest, low, again, end = filling
-    zero = float(dust.solve_zero_stress(pressed, dust.compressive_strength(pressed, material), 45e3, 4.0, True))
+    zero = float(
+        dust.solve_zero_stress(pressed, dust.compressive_strength(pressed, material), 45e3, 4.0, True)
+    )
     modulus = float(dust.bulk_modulus(zero, material))
 
     def climb(start: float, stop: float) -> float:
