@@ -16,16 +16,18 @@ FALLS_WITH = "free flight falls"
 def judge_scales(drops: Sequence[Found]) -> list[str]:
     """g ∝ pixel · rate², speed ∝ pixel · rate. What is said here of all drops is taken out of what looks odd of each.
 
-    A drop far from the others has a fault of its own and keeps its own line.
+    A drop far from the others has a fault of its own and keeps its own line, and so does one alone among videos.
     """
     lines = []
     gravities = [drop.gravity for drop in drops if drop.gravity is not None]
-    gravity = pool(gravities)
-    speed = pool([drop.speed for drop in drops if drop.speed is not None])
+    speeds = [drop.speed for drop in drops if drop.speed is not None]
+    gravity = pool(gravities) if len(gravities) > 1 or len(drops) == 1 else None
+    speed = pool(speeds) if len(speeds) > 1 or len(drops) == 1 else None
     if gravity is not None and is_odd(gravity):
         g, sigma = gravity.value * STANDARD_GRAVITY, gravity.sigma * STANDARD_GRAVITY
         lines.append(
-            f"free fall{_count(drops, gravities)} shows g = {g:.2f} ± {sigma:.2f} m/s² instead of {STANDARD_GRAVITY}; "
+            f"free fall{_count(drops, gravities, '', ' of ')} shows g = {g:.2f} ± {sigma:.2f} m/s² instead of "
+            f"{STANDARD_GRAVITY}; "
             f"a pixel size of {100 / gravity.value:.1f} % or a frame rate of {100 / math.sqrt(gravity.value):.1f} % of what is "
             "stated would put it right (g grows as pixel · rate²): check pixel_size_um and frame_rate_Hz"
         )
@@ -35,7 +37,8 @@ def judge_scales(drops: Sequence[Found]) -> list[str]:
         )
     if speed is not None and is_odd(speed):
         lines.append(
-            f"the drops are {abs(speed.value - 1):.1%} {'faster' if speed.value > 1 else 'slower'} at contact than their heights "
+            f"{_count(drops, speeds, 'the drops')} are {abs(speed.value - 1):.1%} "
+            f"{'faster' if speed.value > 1 else 'slower'} at contact than their heights "
             f"say (± {speed.sigma:.1%}): check pixel_size_um, frame_rate_Hz and from where height_mm is counted"
         )
         _forget(
@@ -49,9 +52,9 @@ def judge_scales(drops: Sequence[Found]) -> list[str]:
     return lines
 
 
-def _count(drops: Sequence[Found], shown: Sequence[Measured]) -> str:
+def _count(drops: Sequence[Found], shown: Sequence[Measured], all_of_them: str, before: str = "") -> str:
     """Of how many drops, where not of all."""
-    return "" if len(shown) == len(drops) else f" of {len(shown)} of {len(drops)} drops"
+    return all_of_them if len(shown) == len(drops) else f"{before}{len(shown)} of {len(drops)} drops"
 
 
 def _forget(drops: Sequence[Found], words: str) -> None:
