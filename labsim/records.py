@@ -19,8 +19,6 @@ STANDARD_GRAVITY = (
     9.81  # m/s^2, of every free fall, and of the nominal model where a campaign says nothing else
 )
 
-Tip = Literal["hemisphere", "sphere", "cylinder"]
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -74,11 +72,12 @@ class Material:
 class Projectile:
     """A rigid projectile. A hemisphere is the end of a rod of the same radius; a cylinder is planar only."""
 
-    tip: Tip
+    tip: str  # a file of labsim/sph/tips, or the path of one
     tip_radius: float  # m
     mass: float  # kg (planar: kg per metre of cylinder)
     mass_sigma: float = 0.0
     length: float = 0.0  # m, of the whole rod; 0 where it does not matter
+    shape: tuple[tuple[str, float], ...] = ()  # SI, the tip's own numbers that are not at their defaults
 
     @property
     def simulated(self) -> Projectile:

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import EffectError
-from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Material, Projectile, Sample, Tip
+from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Material, Projectile, Sample
 from ..sph import DropSetting
 from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
 
@@ -86,7 +86,7 @@ class Place:
     is_scan: bool
     sample: Sample
     nominal: Material
-    tip: Tip = "hemisphere"
+    tip: str = "hemisphere"
     smallest_tip_radius: float = 0.5e-3
 
 

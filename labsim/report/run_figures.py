@@ -10,6 +10,8 @@ from scipy.spatial import KDTree
 
 from ..records import FloatArray
 from ..sph import DropRun, DropSetting
+from ..sph.profile import outline
+from ..sph.tips import make_profile
 from .look import BLUE, GREY, INK, PHI, new_figure
 
 
@@ -80,14 +82,8 @@ def fill_density_field(
     field = np.where(distance < reach, phi[nearest], np.nan)
     axes = figure.add_subplot()
     drawn = axes.pcolormesh(columns * 1e3, rows * 1e3, field, **PHI, rasterized=True)
-    centre = radius - depth
-    angle = np.linspace(0.0, 2 * np.pi, 181)
-    if setting.projectile.tip == "hemisphere":
-        angle = np.linspace(np.pi, 2 * np.pi, 91)
-    x, y = radius * np.cos(angle), centre + radius * np.sin(angle)
-    if setting.projectile.tip == "hemisphere":
-        top = max(2.0 * radius, centre + radius)
-        x, y = np.concatenate([[-radius], x, [radius]]), np.concatenate([[top], y, [top]])
+    x, y = outline(make_profile(setting.projectile), max(2.0 * radius + depth, 2.0 * radius))
+    x, y = np.concatenate([-x[::-1], x]), np.concatenate([y[::-1], y]) - depth
     axes.fill(x * 1e3, y * 1e3, facecolor="#DDDDDD", edgecolor=INK, lw=1.2)
     axes.axhline(0.0, color=INK, lw=0.6, ls=":")
     axes.set(aspect="equal", xlabel="mm", ylabel="height above the undisturbed surface (mm)")

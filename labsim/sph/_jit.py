@@ -17,13 +17,15 @@ import numba
 import platformdirs
 
 _SOURCES = Path(__file__).parent
+# a law's file is in the hash of its own runs; a tip's and a motion's numbers are in the key of theirs
+ONE_FILE_EACH = ("materials", "tips", "motions")
 
 
 def hash_sources() -> str:
-    """Hash of every source of the solver but the laws', and the version of the compiler: changes when any result could change."""
+    """Hash of every source of the solver but the laws', tips' and motions', and the version of the compiler: changes when any result could change."""
     digest = hashlib.sha256(numba.__version__.encode())
     for path in sorted(_SOURCES.rglob("*.py")):
-        if path.parent.name == "materials" and not path.name.startswith("_"):
+        if path.parent.name in ONE_FILE_EACH and not path.name.startswith("_"):
             continue
         digest.update(path.relative_to(_SOURCES).as_posix().encode())
         digest.update(path.read_bytes())

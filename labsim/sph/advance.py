@@ -89,7 +89,7 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
         last_dt = body[
             LAST_STEP
         ]  # the velocities are those of the step that moved the particles, so is its length
-        measure_surface(near, numbers.is_rod, numbers.tip_radius, body[TIP], spacing, s)
+        measure_surface(near, numbers.profile, body[TIP], spacing, s)
         close_contact(near, films, h, spacing, s)
         met = 0
         # in blocks: what one pass writes is still in the nearest cache when the next one reads it

@@ -13,16 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SimulationError
-from ..records import FloatArray, Projectile
+from ..records import FloatArray
 from . import particles as rows
 from .lines import ROOM, WIDTH, make_lines, make_rows
 from .loop import load_loop
 from .materials import find_law
 from .neighbours import Neighbours
 from .particles import name_rows, place_particles
+from .profile import measure_distance
 from .run import DropRun, make_run
 from .setting import DropSetting, check_setting
 from .state import LAST_STEP, LOG, SPEED, TIME, TIP, Lines, Lists, Numbers, Outside, Stretch
+from .tips import make_profile
 
 STEPS_AT_ONCE = 64
 LEAST = 0.1  # of the skin: a list that allows less is made anew
@@ -58,6 +60,7 @@ def evolve(
     numerics, material, projectile = setting.numerics, setting.material, setting.projectile
     axisymmetric = setting.geometry == "axisymmetric"
     n = dust.shape[1]
+    profile = make_profile(projectile)
     mirrors = (0.0, *planes) if axisymmetric else planes
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
@@ -88,8 +91,7 @@ def evolve(
         n=n,
         axisymmetric=axisymmetric,
         free_mass=float(dust[rows.MASS, ~wall].sum()),
-        is_rod=projectile.tip == "hemisphere",
-        tip_radius=projectile.tip_radius,
+        profile=profile,
         body_mass=projectile.mass / per_unit,
         gravity=setting.gravity,
         friction=material.contact_friction,
@@ -127,7 +129,7 @@ def evolve(
             if not fresh:
                 origin = state[[rows.X, rows.Z], :n].copy()
                 near, inner, body_origin = _find_near(
-                    state[:, :n], projectile, setting.spacing, body[TIP], skin, axisymmetric
+                    state[:, :n], profile, setting.spacing, body[TIP], skin, axisymmetric
                 )
                 films = np.zeros_like(near)
             if made + steps_at_once + 2 > len(log):
@@ -204,16 +206,14 @@ def _fill_elastic(setting: DropSetting, state: FloatArray) -> None:
 
 
 def _find_near(
-    state: FloatArray, projectile: Projectile, spacing: float, tip: float, skin: float, axisymmetric: bool
+    state: FloatArray, profile: FloatArray, spacing: float, tip: float, skin: float, axisymmetric: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Particles that can come within two spacings of the projectile, or to the axis, before the next list; and the tip now."""
     x, z = state[rows.X], state[rows.Z]
     margin = 2 * spacing + skin
     state[rows.DISTANCE] = 1.0e9
     near = np.nonzero(z > tip - margin)[0]
-    across, above = np.abs(x[near]), z[near] - tip - projectile.tip_radius
-    beside = (above > 0) & (projectile.tip == "hemisphere")
-    distance = np.where(beside, across, np.hypot(across, above)) - projectile.tip_radius
+    distance = measure_distance(x[near], z[near], float(tip), profile)
     inner = np.nonzero(np.abs(x) < spacing)[0] if axisymmetric else np.zeros(0)
     return near[distance < margin].astype(np.uint32), inner.astype(np.uint32), float(tip)
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 
 from ._jit import compiled
+from .profile import find_surface
 
 SLIP_SPEED = 1.0e-3  # m/s, over which friction turns round
 TOUCHING = 1.05  # half thicknesses of a cell at which contact begins to close
@@ -40,28 +41,16 @@ def interpolate(at, knots, values):
 
 
 @compiled
-def measure_surface(near, is_rod, tip_radius, tip_z, spacing, s):
+def measure_surface(near, profile, tip_z, spacing, s):
     """Distance to the projectile's surface, its normal into the dust, and the share of its width that each particle's cell
     has kept along that normal, for the particles ``near``. Beyond two spacings it only gets a large distance."""
-    centre = tip_z + tip_radius
     x, z, dxx, dxz, dzx, dzz = s.x, s.z, s.dxx, s.dxz, s.dzx, s.dzz
     distance, nx, nz, thickness = s.distance, s.nx, s.nz, s.thickness
     for i in near:
-        distance[i] = 1.0e9
-        if is_rod and z[i] > centre:
-            a = 1.0 if x[i] > 0.0 else -1.0
-            b = 0.0
-            d = abs(x[i]) - tip_radius
-        else:
-            a = x[i]
-            b = z[i] - centre
-            length = math.sqrt(a * a + b * b)
-            d = length - tip_radius
-            if d > 2.0 * spacing or length == 0.0:
-                continue
-            a /= length
-            b /= length
+        d, a, b = find_surface(x[i], z[i], tip_z, profile)
         distance[i] = d
+        if d > 2.0 * spacing:
+            continue
         nx[i] = a
         nz[i] = b
         thickness[i] = min(math.hypot(dxx[i] * a + dzx[i] * b, dxz[i] * a + dzz[i] * b), 1.0)

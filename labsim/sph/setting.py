@@ -9,6 +9,7 @@ from typing import Literal
 from ..errors import SimulationError
 from ..records import STANDARD_GRAVITY, Material, Projectile
 from .materials import find_law
+from .tips import find_tip, make_profile
 
 LOOSEST = 0.005  # of φ over φ1, that a gradient leaves
 LEAST_GRADED = 3.0  # tip radii that a falling φ0 must fall through before it stays as it is
@@ -120,9 +121,10 @@ def check_setting(setting: DropSetting) -> None:
             "projectile",
             f"radius {projectile.tip_radius!r} m, mass {projectile.mass!r} kg; both must be positive",
         )
-    if projectile.tip == "cylinder" and setting.geometry != "planar":
+    make_profile(projectile)
+    if setting.geometry not in getattr(find_tip(projectile.tip), "GEOMETRIES", (setting.geometry,)):
         refuse(
-            "projectile.tip", "a lying cylinder is planar; choose hemisphere or sphere, or geometry planar"
+            "projectile.tip", f"a {projectile.tip} is planar; choose another tip, or geometry planar"
         )
     if setting.spacing > projectile.tip_radius / 4 * 1.0000001:
         refuse(

@@ -66,8 +66,7 @@ class Numbers(NamedTuple):
     n: int
     axisymmetric: bool
     free_mass: float  # of particles that are no wall
-    is_rod: bool
-    tip_radius: float
+    profile: FloatArray  # of the projectile (see ``profile``), m
     body_mass: float
     gravity: float
     friction: float  # Coulomb's, of dust on the projectile

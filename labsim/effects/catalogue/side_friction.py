@@ -4,6 +4,8 @@ Stated for a rod of 1 mm diameter. It acts on the circumference, so it is scaled
 """
 
 from labsim.effects import HalfNormal, Parameter
+from labsim.sph.profile import has_shaft
+from labsim.sph.tips import make_profile
 
 REFERENCE_RADIUS = 0.5e-3  # m
 
@@ -33,13 +35,13 @@ expect = {"penetration_depth": -1, "stopping_time": -1}
 def applies(campaign):
     if campaign.geometry == "planar":
         return "the nominal model is planar, and a lying cylinder has no side"
-    if all(drop.projectile.tip != "hemisphere" for drop in campaign.drops):
+    if not any(has_shaft(make_profile(drop.projectile)) for drop in campaign.drops):
         return "no drop was made with a rod"
     return ""
 
 
 def change_setting(setting, values, place):
-    if setting.projectile.tip != "hemisphere":
+    if not has_shaft(make_profile(setting.projectile)):
         return setting
     radius = setting.projectile.tip_radius
     return setting.replace(side_friction=values["force_per_length"] * (radius / REFERENCE_RADIUS))
