@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import InferenceError, LabsimError
 from ..sph import DropRun, DropSetting, solver_hash
+from ..sph.tips import make_profile
 from .run_parts import AnyPart, Part
 
 FORMAT = 1  # of the stored files; part of the key
@@ -69,10 +70,13 @@ class Stored:
 def canonical(setting: DropSetting) -> str:
     """The setting as JSON in which equal settings are equal texts (every number as an exact hexadecimal float).
 
-    A law from elsewhere goes by its name: what is in its file is part of the solver's hash, where it lies changes nothing.
+    A law from elsewhere goes by its name: what is in its file is part of the solver's hash, where it lies changes nothing. The
+    outline that a tip's file draws stands in place of the tip's own numbers.
     """
     values = dataclasses.asdict(setting)
     values["material"]["law"] = Path(setting.material.law).stem
+    values["projectile"]["tip"] = Path(setting.projectile.tip).stem
+    values["projectile"]["shape"] = make_profile(setting.projectile).tolist()
     return json.dumps(_exact(values), sort_keys=True, separators=(",", ":"))
 
 
