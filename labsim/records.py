@@ -86,6 +86,16 @@ class Projectile:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """What moves the projectile (drop.toml ``[motion]``)."""
+
+    kind: str = "free"  # a file of labsim/sph/motions, or the path of one
+    start_depth: float = 0.0  # m, of the tip in the dust when it starts
+    values: tuple[tuple[str, float], ...] = ()  # SI, its own numbers that are not at their defaults
+    table: tuple[tuple[float, float], ...] = ()  # (time s, depth m), where the kind wants one
+
+
+@dataclass(frozen=True)
 class Camera:
     frame_rate: float  # Hz
     pixel_size: float  # m

@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import InferenceError, LabsimError
 from ..sph import DropRun, DropSetting, solver_hash
+from ..sph.setting import say_material, say_motion, say_projectile
 from ..sph.tips import make_profile
 from .run_parts import AnyPart, Part
 
@@ -71,12 +72,16 @@ def canonical(setting: DropSetting) -> str:
     """The setting as JSON in which equal settings are equal texts (every number as an exact hexadecimal float).
 
     A law from elsewhere goes by its name: what is in its file is part of the solver's hash, where it lies changes nothing. The
-    outline that a tip's file draws stands in place of the tip's own numbers.
+    outline that a tip's file draws stands in place of the tip's own numbers, a driver's path in place of what made it.
     """
     values = dataclasses.asdict(setting)
     values["material"]["law"] = Path(setting.material.law).stem
     values["projectile"]["tip"] = Path(setting.projectile.tip).stem
     values["projectile"]["shape"] = make_profile(setting.projectile).tolist()
+    path = setting.path
+    values["motion"] = {"start_depth": setting.motion.start_depth, "path": [each.tolist() for each in path]}
+    if path[0].size:
+        values["impact_speed"] = 0.0
     return json.dumps(_exact(values), sort_keys=True, separators=(",", ":"))
 
 
@@ -205,10 +210,9 @@ def check_run_file(path: Path) -> None:
 
 
 def say_setting(setting: DropSetting) -> str:
-    material = setting.material
+    """A setting in one line."""
     return (
-        f"{setting.geometry} {setting.projectile.tip} R {setting.projectile.tip_radius * 1e3:g} mm, "
-        f"{setting.impact_speed:.4g} m/s, p_m {material.p_m:.5g} Pa, K0 {material.bulk_modulus / 1e3:g} kPa, "
+        f"{setting.geometry} {say_projectile(setting)}, {say_motion(setting)}, {say_material(setting.material)}, "
         f"spacing {setting.spacing * 1e6:.4g} µm"
     )
 

@@ -290,4 +290,6 @@ def estimate_cost(setting: DropSetting) -> float:
     """Relative cost of a run: particles times steps (the sound speed goes with the root of the bulk modulus)."""
     width, depth = setting.extent
     slowness = setting.material.p_m**-0.3 * setting.projectile.tip_radius  # the stopping time goes with it
+    if (time := setting.path[0]).size:
+        slowness = time[-1] / 30.0  # a drop takes thirty times its slowness
     return width * depth * slowness * setting.material.bulk_modulus**0.5 / setting.spacing**3

@@ -67,6 +67,7 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
     blocks = (np.uint64(n) + BLOCK - one) // BLOCK
     allowed, first = stretch.allowed, stretch.first
     films, lost = lists.films, lines.lost
+    led = outside.path_time.size > 0
     for step in range(stretch.steps):
         worst = 0.0
         for i in range(n):
@@ -173,6 +174,9 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
                     u[i] = max(u[i], 0.0)
         row = log[first + step]
         body[SPEED] += dt * ((force + pushed) / numbers.body_mass - gravity)
+        if led:
+            below = interpolate(body[TIME] + dt, outside.path_time, outside.path_depth)
+            body[SPEED] = -(below + body[TIP]) / dt
         body[TIP] += dt * body[SPEED]
         body[TIME] += dt
         body[FRICTION] += dt * lost[1]
@@ -185,6 +189,9 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
         row[7] = body[FRICTION]
         row[8] = last[8] + dt * lost[0]
         row[9] = last[9] - dt * pushed * body[SPEED]
+        if led:  # the driver carries the projectile, and pushes the dust
+            row[5] += dt * (gravity * numbers.body_mass - force - pushed)
+            row[10] = last[10] - dt * (force + pushed) * body[SPEED]
         if (
             far > 0
             or abs(body[TIP] - stretch.body_origin) > allowed

@@ -60,7 +60,8 @@ def evolve(
     numerics, material, projectile = setting.numerics, setting.material, setting.projectile
     axisymmetric = setting.geometry == "axisymmetric"
     n = dust.shape[1]
-    profile = make_profile(projectile)
+    profile, path = make_profile(projectile), setting.path
+    led = path[0].size > 0
     mirrors = (0.0, *planes) if axisymmetric else planes
     h = numerics.smoothing * setting.spacing
     skin = numerics.skin * h
@@ -81,6 +82,7 @@ def evolve(
         setting.side_friction * force_scale,
         *_split(setting.force_of_depth, force_scale),
         *_split(setting.force_of_speed, force_scale),
+        *path,
     )
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[TIP], -body[SPEED]
@@ -108,7 +110,7 @@ def evolve(
         diffusivity=numerics.exchange * h * h,
         reference=setting.filling_factor,
     )
-    made, builds, stop_step, limit = 0, 0, None, setting.duration
+    made, builds, stop_step, limit = 0, 0, None, min([setting.duration, *path[0][-1:]])
     farthest = 1000 * (np.abs(dust[[rows.X, rows.Z]]).max() + setting.spacing)
     while body[TIME] < limit:
         if not np.abs(state[[rows.X, rows.Z], :n]).max() < farthest:
@@ -141,13 +143,13 @@ def evolve(
                 Lists(neighbours.start, neighbours.list, source, twice_plane, fixed, near, inner, films, origin),
                 Lines(front, back, nearby, beyond, lost),
                 numbers, outside, constants, tables, log, body,
-                Stretch(steps, made + 1, allowed, body_origin, stop_step is not None),
+                Stretch(steps, made + 1, allowed, body_origin, led or stop_step is not None),
             )  # fmt: skip
             if done < 0 or not np.isfinite(body).all():
                 raise _blown_up(setting, made + max(done, 0), body[TIME])
             made += done
             fresh = done == steps
-            if body[SPEED] >= 0.0 and stop_step is None:
+            if body[SPEED] >= 0.0 and stop_step is None and not led:
                 stop_step = made
                 limit = min(limit, body[TIME] * (1 + setting.after_stop))
                 at_stop = state[:, :n].copy()
@@ -163,6 +165,8 @@ def evolve(
     end = state[:, :n]
     if stop_step is None:
         at_stop = end.copy()
+    if led and body[TIME] >= path[0][-1]:
+        stop_step = made
     for each in (end, at_stop):
         _fill_elastic(setting, each)
     return Evolution(
@@ -175,7 +179,8 @@ def evolve(
 
 
 def simulate(setting: DropSetting, progress: Callable[[float], None] | None = None) -> DropRun:
-    """Run one drop; time zero is the first contact of the tip with the undisturbed surface.
+    """Run one drop or push; time zero is the start, at the depth that its motion says: 0 is the first contact of the tip with
+    the undisturbed surface. Where it starts deeper, there is no dust in the projectile.
 
     progress is called now and then with the time reached, in s. Raises SimulationError (setting out of range, or the
     run blew up: then the message names its parameters).
@@ -183,7 +188,9 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     check_setting(setting)
     began = time.perf_counter()
     dust, wall = place_particles(setting)
-    body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
+    time_knots, led = setting.path
+    speed = (led[1] - led[0]) / time_knots[1] if led.size else setting.impact_speed
+    body = np.array([-setting.motion.start_depth, -speed, 0.0, 0.0, 0.0])
     watch = None if progress is None else lambda reached, state: progress(reached)
     _fill_elastic(setting, dust)
     result = evolve(setting, dust, wall, body, watch)

@@ -8,8 +8,10 @@ import numpy as np
 
 from ..records import FloatArray
 from .materials import find_law
+from .profile import measure_distance
 from .setting import DropSetting
 from .state import Rows
+from .tips import make_profile
 
 (
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
@@ -82,5 +84,10 @@ def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     bearable = find_law(setting.material.law).bearable_pressure(setting, phi)
     state = fill_at_rest(setting, x, z, phi, np.minimum(weight_above, bearable))
     edge = width if axisymmetric else width / 2
+    if setting.motion.start_depth > 0.0:
+        clear = (
+            measure_distance(x, z, -setting.motion.start_depth, make_profile(setting.projectile)) > 0.0
+        )
+        x, z, state = x[clear], z[clear], np.ascontiguousarray(state[:, clear])
     wall = (z < -depth + WALL_LAYERS * spacing) | (np.abs(x) > edge - WALL_LAYERS * spacing)
     return state, wall

@@ -1,4 +1,4 @@
-"""What a drop gave: its curve, the dust at the stop, and how far momentum and energy balance."""
+"""What a drop or a push gave: its curve, the dust at the stop, and how far momentum and energy balance."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class DropRun:
     depth: FloatArray
     velocity: FloatArray
     force: FloatArray
-    penetration_depth: float  # m, at the first v = 0
+    penetration_depth: float  # m, at the first v = 0, or where its path ended
     stopping_time: float  # s
-    stopped: bool
+    stopped: bool  # or led to the end of its path
     particles: Particles
     steps: int
     rebuilds: int
@@ -78,8 +78,11 @@ class DropRun:
         return half * by_r, half * by_z
 
     def energy_share(self, sink: str) -> float:
-        """What went into ``sink``, a name in ``energies``, of the kinetic energy at contact and what gravity gave."""
-        return self.energies[sink] / (self.energies["kinetic_at_contact"] + self.energies["gravity"])
+        """What went into ``sink``, a name in ``energies``, of the kinetic energy at contact and what gravity and a driver gave."""
+        given = (
+            self.energies["kinetic_at_contact"] + self.energies["gravity"] + self.energies.get("driver", 0.0)
+        )
+        return self.energies[sink] / given if given else 0.0
 
     def depth_at(self, time: FloatArray) -> FloatArray:
         """Depth (m) at times (s) from contact; before it free fall without gravity, after the run's end at rest."""
@@ -99,14 +102,17 @@ def make_run(
     rebuilds: int,
     seconds: float,
 ) -> DropRun:
-    """Book momentum and energy, thin the curve, and pack the record."""
+    """Book momentum and energy, thin the curve, and pack the record. A projectile that is led has no place in the books: what
+    its driver gives goes into the dust."""
     law = find_law(setting.material.law)
     planar = setting.geometry == "planar"
     stop = stop_step if stop_step is not None else len(log) - 1
-    body_mass = setting.projectile.mass / per_unit
+    led = setting.path[0].size > 0
+    body_mass = 0.0 if led else setting.projectile.mass / per_unit
     warnings = []
     if stop_step is None:
-        warnings.append(f"did not stop within {setting.duration * 1e3:.3g} ms")
+        what = "reach the end of its path" if led else "stop"
+        warnings.append(f"did not {what} within {setting.duration * 1e3:.3g} ms")
     warnings += law.find_warnings(setting, *rows.name_rows(setting, at_stop))
 
     brought = body_mass * setting.impact_speed
@@ -140,17 +146,26 @@ def make_run(
         "outside": float(log[-1, 9]),
         "contact": float(log[-1, 8]),
     }
-    spent = sum(energies[sink] for sink in energies if sink not in ("kinetic_at_contact", "gravity"))
-    energy_error = (kinetic_0 + energies["gravity"] - spent) / kinetic_0
-    viscous_share = float(log[stop, 6]) / (kinetic_0 + body_mass * setting.gravity * log[stop, 1])
+    driver = float(log[-1, 10])
+    if led:
+        energies["driver"] = driver
+        brought = float(np.sum(np.abs(log[1:, 3]) * np.diff(log[:, 0])))
+    sources = ("kinetic_at_contact", "gravity", "driver")
+    spent = sum(energies[sink] for sink in energies if sink not in sources)
+    scale = max(map(abs, energies.values())) if led else kinetic_0
+    energy_error = (kinetic_0 + energies["gravity"] + driver - spent) / (scale or 1.0)
+    given = kinetic_0 + body_mass * setting.gravity * log[stop, 1] + log[stop, 10]
+    viscous_share = float(log[stop, 6]) / (given or 1.0)
 
     # the stop lies between the last step with v > 0 and the first without
-    if stop_step is not None and log[stop, 2] != log[stop - 1, 2]:
+    if stop_step is not None and not led and log[stop, 2] != log[stop - 1, 2]:
         part = log[stop - 1, 2] / (log[stop - 1, 2] - log[stop, 2])
     else:
         part = 1.0
     stopping_time = log[stop - 1, 0] + part * (log[stop, 0] - log[stop - 1, 0])
     depth = log[stop - 1, 1] + 0.5 * part * log[stop - 1, 2] * (log[stop, 0] - log[stop - 1, 0])
+    if led:
+        depth = log[stop, 1]
 
     keep = np.unique(
         np.append(np.arange(0, len(log), math.ceil(len(log) / CURVE_POINTS)), [stop, len(log) - 1])
@@ -180,7 +195,7 @@ def make_run(
         steps=len(log) - 1,
         rebuilds=rebuilds,
         wall=seconds,
-        momentum_error=float(missing / brought),
+        momentum_error=float(missing / (brought or 1.0)),
         energy_error=float(energy_error),
         energies={key: value * per_unit for key, value in energies.items()},
         viscous_share=viscous_share,

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal
 
 from ..errors import SimulationError
-from ..records import STANDARD_GRAVITY, Material, Projectile
+from ..records import STANDARD_GRAVITY, FloatArray, Material, Motion, Projectile
 from .materials import find_law
+from .motions import make_path
+from .plugins import Parameter, key_of
 from .tips import find_tip, make_profile
 
 LOOSEST = 0.005  # of φ over φ1, that a gradient leaves
@@ -44,7 +47,7 @@ class DropSetting:
     """
 
     projectile: Projectile
-    impact_speed: float  # m/s, at first contact
+    impact_speed: float  # m/s, at the start, of a free projectile; of no meaning to one that is led
     material: Material
     filling_factor: float = 0.15
     monomer_density: float = 2000.0  # kg/m^3
@@ -56,6 +59,7 @@ class DropSetting:
     width: float | None = None  # m, half width in r-z, full width in the plane; None: enough for this drop
     depth: float | None = None  # m, of the dust; None: enough for this drop
     numerics: Numerics = field(default_factory=Numerics)
+    motion: Motion = Motion()
 
     strength_rate: float = 0.0  # s^n, Σ (1 + strength_rate ε̇^n)
     strength_rate_exponent: float = 0.5
@@ -74,14 +78,22 @@ class DropSetting:
         return replace(self, **changes)  # type: ignore[arg-type]
 
     @property
+    def path(self) -> tuple[FloatArray, FloatArray]:
+        """Times (s) and depths (m) that a driver leads the tip through; empty for a free one."""
+        return make_path(self.motion)
+
+    @property
     def expected_depth(self) -> float:
-        """Depth (m) that the tip may reach: a little less than D = 8e-4 m v / A, in m, kg and s (Güttler et al. 2009), for dust
+        """Depth (m) that the tip may reach: a driver's path says it, and for a drop a little less than D = 8e-4 m v / A, in m, kg and s (Güttler et al. 2009), for dust
         of 1300 Pa or more, deeper in softer dust with the third root of its strength. It only sizes boxes."""
+        _, led = self.path
+        if led.size:
+            return float(led.max())
         radius = self.projectile.tip_radius
         area = 2 * radius if self.geometry == "planar" else math.pi * radius**2
         strength = max(find_law(self.material.law).resistance(self), 1.0)
         # softer dust lets it through to where the bottom would be felt
-        return float(
+        return self.motion.start_depth + float(
             7e-4 * self.projectile.mass * self.impact_speed / area * max(1.0, 1300.0 / strength) ** (1 / 3)
         )
 
@@ -112,6 +124,10 @@ def check_setting(setting: DropSetting) -> None:
         raise SimulationError("simulation", key, message)
 
     law, projectile = find_law(setting.material.law), setting.projectile
+    time, led = setting.path
+    speed = setting.impact_speed
+    if time.size:
+        speed = max(abs(led[1:] - led[:-1]) / (time[1:] - time[:-1]))
     for key in ("impact_speed", "filling_factor", "monomer_density", "spacing", "duration"):
         value = getattr(setting, key)
         if not (math.isfinite(value) and value > 0):
@@ -132,6 +148,12 @@ def check_setting(setting: DropSetting) -> None:
             f"{setting.spacing:.3g} m does not resolve a tip of {projectile.tip_radius:.3g} m; "
             f"use {projectile.tip_radius / 4:.3g} m or less",
         )
+    start = setting.motion.start_depth
+    if not 0.0 <= start < setting.extent[1] - 3 * projectile.tip_radius:
+        refuse(
+            "motion.start_depth",
+            f"is {start:g} m; at least three tip radii of the {setting.extent[1]:g} m of dust must lie below the tip",
+        )
     law.check(setting, refuse)
     if setting.graded_depth < LEAST_GRADED * projectile.tip_radius:
         refuse(
@@ -140,9 +162,43 @@ def check_setting(setting: DropSetting) -> None:
             f"the projectile acts; at least {LEAST_GRADED:g} tip radii must lie above that",
         )
     sound = law.sound_speed(setting)
-    if setting.impact_speed >= sound:
+    if speed >= sound:
         refuse(
-            "impact_speed",
-            f"{setting.impact_speed:.3g} m/s is not below the sound speed {sound:.3g} m/s of this dust; "
+            "motion" if time.size else "impact_speed",
+            f"{speed:.3g} m/s is not below the sound speed {sound:.3g} m/s of this dust; "
             "lower the speed or raise bulk_modulus",
         )
+
+
+def say_projectile(setting: DropSetting) -> str:
+    """Tip, radius, and the tip's own numbers that are not at their defaults."""
+    own = {each.name: each for each in find_tip(setting.projectile.tip).PARAMETERS}
+    return f"{Path(setting.projectile.tip).stem} R {setting.projectile.tip_radius * 1e3:g} mm" + "".join(
+        f", {_say_value(own[name], value)}" for name, value in setting.projectile.shape
+    )
+
+
+def say_motion(setting: DropSetting) -> str:
+    """What moves it, as ``0.65 m/s`` or ``pushed from 0 to 2 mm at 0.1 m/s``."""
+    time, led = setting.path
+    start = setting.motion.start_depth
+    if time.size:
+        speed = max(abs(led[1:] - led[:-1]) / (time[1:] - time[:-1]))
+        kind = Path(setting.motion.kind).stem
+        return f"{kind} from {led[0] * 1e3:.4g} to {led[-1] * 1e3:.4g} mm at {speed:.4g} m/s"
+    return f"{setting.impact_speed:.4g} m/s" + (f" from {start * 1e3:.4g} mm" if start else "")
+
+
+def say_material(material: Material) -> str:
+    """The law's strength and stiffness, or its numbers that are not at their defaults."""
+    if material.law == "porous_dust":
+        return f"p_m {material.p_m:.5g} Pa, K0 {material.bulk_modulus / 1e3:g} kPa"
+    own = {each.name: each for each in find_law(material.law).PARAMETERS}
+    return ", ".join(
+        [Path(material.law).stem, *(_say_value(own[name], value) for name, value in material.constants)]
+    )
+
+
+def _say_value(parameter: Parameter, value: float) -> str:
+    ending, unit = key_of(parameter)
+    return f"{parameter.name} {value / unit:.4g} {ending[1:]}".rstrip()

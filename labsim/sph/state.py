@@ -30,6 +30,7 @@ LOG = (
     "friction",
     "contact",
     "outside",
+    "driver",
 )
 
 TIP, SPEED, TIME, FRICTION, LAST_STEP = range(5)  # what the array ``body`` holds: m, m/s (upwards), s, J, s
@@ -85,13 +86,16 @@ class Numbers(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """Forces on the projectile that no dust in the simulation exerts: of the immersed length, of depth, of speed."""
+    """What acts on the projectile besides the dust in the simulation: forces of the immersed length, of depth, of speed; and a
+    driver, where there is a path."""
 
     side_friction: float  # N/m
     depth_knots: FloatArray
     depth_force: FloatArray
     speed_knots: FloatArray
     speed_force: FloatArray
+    path_time: FloatArray
+    path_depth: FloatArray
 
 
 class Stretch(NamedTuple):
@@ -101,4 +105,4 @@ class Stretch(NamedTuple):
     first: int
     allowed: float  # m, what a point may move before the lists are made anew
     body_origin: float  # m, height of the tip when they were made
-    stopped: bool
+    stopped: bool  # it has stopped before, or need not
