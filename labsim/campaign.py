@@ -25,6 +25,7 @@ from .campaign_tables import (
     read_source,
 )
 from .errors import CampaignError, MeasurementError
+from .own_keys import DUST, read_motion
 from .records import (
     STANDARD_GRAVITY,
     Camera,
@@ -54,7 +55,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         raise top.wrong("format", f"{version!r} is not a format this labsim reads; write 1")
     name, description = top.text("name"), top.text("description", "")
     sample = read_sample(document.table("sample"))
-    material, p_m_range = read_material(document.table("material"), sample)
+    material, calibrated, p_m_range = read_material(document.table("material"), sample, folder)
     model = document.table("model", required=False)
     gravity = model.number("gravity_m_s2", 0.0, 30.0, default=STANDARD_GRAVITY)
     geometry = model.choice("geometry", ("axisymmetric", "planar"), "axisymmetric")
@@ -83,6 +84,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         sample=sample,
         material=material,
         p_m_range=p_m_range,
+        calibrated=calibrated,
         gravity=gravity,
         geometry=geometry,  # type: ignore[arg-type]
         drops=drops,
@@ -100,7 +102,9 @@ def read_drop(path: Path | str) -> Drop:
     document.top()
     record_table = document.table("record")
     kind = record_table.choice("kind", ("track", "video", "summary"))
-    projectile = read_projectile(document.table("projectile"))
+    campaign = file.resolve().parents[2] if len(file.resolve().parents) > 2 else None
+    projectile = read_projectile(document.table("projectile"), campaign)
+    motion = read_motion(document.table("motion", required=False), campaign, file.parent)
     drop = document.table("drop", required=kind != "summary")
     sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" else drop.number(
         "sequence", 0, 100000, whole=True
@@ -139,6 +143,7 @@ def read_drop(path: Path | str) -> Drop:
         record=record,
         published=published,
         source=source,
+        motion=motion,
     )
 
 
@@ -155,7 +160,9 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         f"  dust: filling factor {campaign.sample.filling_factor:g} ± {campaign.sample.filling_factor_sigma:g}, "
         f"{campaign.sample.diameter * 1e3:g} mm wide, {campaign.sample.depth * 1e3:g} mm deep, "
         f"gas {campaign.sample.gas_pressure:g} Pa",
-        f"  model: {campaign.geometry}, gravity {campaign.gravity:g} m/s², p_m between {low / 1e3:g} and {high / 1e3:g} kPa",
+        f"  model: {campaign.geometry}, gravity {campaign.gravity:g} m/s², "
+        + ("" if campaign.material.law == DUST else f"law {Path(campaign.material.law).stem}, ")
+        + f"{campaign.calibrated} between {low / 1e3:g} and {high / 1e3:g} kPa",
         f"  {_count(campaign.drops, 'drop')} (" + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) + "), tip radii "
         + ", ".join(f"{r * 1e3:g} mm" for r in radii),
         f"  {_count(campaign.scans, 'CT scan')} with slices, "

@@ -6,7 +6,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from .errors import CampaignError
+from .errors import CampaignError, LabsimError
+from .own_keys import DUST, ROUND, read_law, read_range, read_tip
 from .records import Camera, Material, Planar, Projectile, Published, Sample
 from .tables import Document, Table
 
@@ -38,17 +39,13 @@ def read_sample(table: Table) -> Sample:
     )
 
 
-def read_material(table: Table, sample: Sample) -> tuple[Material, tuple[float, float]]:
-    p_m_range = table.get("p_m_range_Pa")
-    if not isinstance(p_m_range, list) or len(p_m_range) != 2:
-        raise table.wrong(
-            "p_m_range_Pa", f"{p_m_range!r} is not a range; write two pressures in Pa as [300.0, 6000.0]"
-        )
-    for value in p_m_range:
-        table.check_number("p_m_range_Pa", value, 1.0, 1e8)
-    low, high = map(float, p_m_range)
-    if high <= low:
-        raise table.wrong("p_m_range_Pa", f"{p_m_range} does not grow; write the smaller pressure first")
+def read_material(
+    table: Table, sample: Sample, folder: Path | None = None
+) -> tuple[Material, str, tuple[float, float]]:
+    """Material, the parameter of its law that is calibrated, and the range of that, SI. folder : of the campaign."""
+    if table.text("law", DUST) != DUST:
+        return read_law(table, folder)
+    low, high = read_range(table, "p_m_range_Pa", 1.0, 1e8)
     material = Material(
         p_m=math.sqrt(low * high),
         **{field: table.number(key, least, most) for key, (field, least, most) in MATERIAL_KEYS.items()},
@@ -69,7 +66,7 @@ def read_material(table: Table, sample: Sample) -> tuple[Material, tuple[float, 
             where.key,
             f"{phi:g} is not above material.phi_1 = {material.phi_1:g}, where Σ vanishes; raise it",
         )
-    return material, (low, high)
+    return material, "p_m", (low, high)
 
 
 def read_planar(table: Table) -> Planar:
@@ -88,21 +85,24 @@ def read_planar(table: Table) -> Planar:
     )
 
 
-def read_projectile(table: Table) -> Projectile:
-    tip = table.choice("tip", ("hemisphere", "sphere"))
+def read_projectile(table: Table, folder: Path | None = None) -> Projectile:
+    """folder : of the campaign, whose ``tips/`` may hold the tip."""
+    sigma = table.sigma_key("mass_mg")
+    tip, shape = read_tip(table, ("tip_radius_mm", "length_mm", "mass_mg", sigma), folder)
     projectile = Projectile(
-        tip=tip,  # type: ignore[arg-type]
+        tip=tip,
+        shape=shape,
         tip_radius=table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3),
         length=table.number("length_mm", 0.1, 500.0, unit=1e-3, default=0.0),
         mass=table.number("mass_mg", 1e-3, 1e7, unit=1e-6),
-        mass_sigma=table.number(table.sigma_key("mass_mg"), 0.0, 1e6, unit=1e-6, default=0.0),
+        mass_sigma=table.number(sigma, 0.0, 1e6, unit=1e-6, default=0.0),
     )
     _check_density(table, projectile)
     if projectile.mass_sigma >= projectile.mass:
         raise table.wrong(
             "mass_sigma_mg", f"{projectile.mass_sigma * 1e6:g} is not below mass_mg; check the unit"
         )
-    if tip == "hemisphere" and 0.0 < projectile.length < projectile.tip_radius:
+    if tip != "sphere" and 0.0 < projectile.length < projectile.tip_radius:
         raise table.wrong(
             "length_mm", f"{projectile.length * 1e3:g} is shorter than the tip's radius; give the whole rod"
         )
@@ -124,7 +124,18 @@ def _check_density(table: Table, projectile: Projectile) -> None:
     """Mass and size must make a body that exists: this finds a unit off by a thousand in either."""
     radius, length = projectile.tip_radius, projectile.length
     volume = 4.0 / 3.0 * math.pi * radius**3
-    if projectile.tip == "hemisphere":
+    if projectile.tip not in ROUND:
+        from .sph.profile import has_shaft, volume_below
+        from .sph.tips import make_profile
+
+        try:
+            profile = make_profile(projectile)
+        except LabsimError as trouble:
+            raise CampaignError(table.file, trouble.key, trouble.message) from None
+        if length == 0.0 and has_shaft(profile):
+            return
+        volume = volume_below(profile, length or math.inf)
+    elif projectile.tip == "hemisphere":
         if length == 0.0:
             return  # a rod of unknown length
         volume = volume / 2.0 + math.pi * radius**2 * max(length - radius, 0.0)

@@ -134,6 +134,7 @@ class Drop:
     source: dict = field(
         default_factory=dict
     )  # [source] as written: where each figure comes from, what is assumed
+    motion: Motion = Motion()
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ class Campaign:
     name: str
     description: str
     sample: Sample
-    material: Material  # nominal; its p_m is the geometric middle of p_m_range
+    material: Material  # nominal; its p_m (or what else is calibrated) is the geometric middle of p_m_range
     p_m_range: tuple[float, float]  # Pa, the prior's limits
     gravity: float  # m/s^2 in the nominal model
     geometry: Literal["axisymmetric", "planar"]
@@ -204,6 +205,7 @@ class Campaign:
     published_scans: tuple[PublishedScan, ...] = ()
     planar: Planar = Planar()
     source: dict = field(default_factory=dict)  # campaign.toml [source] as written
+    calibrated: str = "p_m"  # the parameter of the law that p_m_range is the range of
 
 
 @dataclass(frozen=True)

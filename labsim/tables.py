@@ -39,6 +39,7 @@ class Table:
     def __init__(self, file: Path, name: str, values: dict[str, Any]) -> None:
         self.file, self.name, self.values = file, name, values
         self.known: set[str] = set()
+        self.note = ""  # which keys there are, where some depend on what another key says
 
     def key(self, key: str) -> str:
         return f"{self.name}.{key}" if self.name else key
@@ -151,7 +152,10 @@ class Table:
             if key not in self.known:
                 near = _nearest(key, self.known)
                 raise self.wrong(
-                    key, "is not a key of the campaign format" + (f"; did you mean {near}?" if near else "")
+                    key,
+                    "is not a key of the campaign format"
+                    + (f"; did you mean {near}?" if near else "")
+                    + (f" ({self.note})" if near and self.note else f"; {self.note}" if self.note else ""),
                 )
 
 

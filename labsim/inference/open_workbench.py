@@ -19,6 +19,7 @@ from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
 from .scans import ObservedScan, ScanModel
 from .undisturbed import UndisturbedDust
+from .supported import refuse_others
 from .workbench import Workbench
 
 SCAN_MARGIN = 1.06
@@ -41,6 +42,7 @@ def open_workbench(
     model: Model | None = None,
 ) -> Workbench:
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
+    refuse_others(campaign)
     drops = drops if drops is not None else observe_drops(campaign)[0]
     if not drops:
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")

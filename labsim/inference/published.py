@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..errors import InferenceError
 from ..records import STANDARD_GRAVITY, Campaign, Drop, Measured
 from .planar import expected_raw_depth
+from .supported import refuse_others
 
 FIGURE_KINDS = ("depth", "stopping_time")
 
@@ -25,6 +26,7 @@ class Figure:
 
 def choose_drops(campaign: Campaign, use: Sequence[str]) -> list[Drop]:
     """The drops to calibrate on: those named in [planar], or all. Raises InferenceError where figures are missing."""
+    refuse_others(campaign)
     for name in use:
         if name not in FIGURE_KINDS:
             raise InferenceError(

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..own_keys import ROUND
 from ..records import STANDARD_GRAVITY, DecelerationCurve, Drop, Track
 from ..video.contact_row import find_surface_row
 from .observe import ObservedDrop
@@ -28,6 +29,8 @@ def doubt_surface_row(drop: Drop, track: Track, curve: DecelerationCurve) -> str
     fault, and would move the contact. Nothing is said where it is off by more than SCALE_LIMIT.
     """
     camera = drop.camera
+    if drop.projectile.tip not in ROUND:
+        return None
     assert camera is not None and curve.clock is not None
     if (curve.clock[track.valid] < curve.contact_time.value).sum() < LEAST_FREE:
         return None

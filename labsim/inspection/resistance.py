@@ -16,7 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..records import STANDARD_GRAVITY, Campaign, FloatArray
+from ..own_keys import ROUND
+from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Motion
 from .found import Found, is_odd
 
 LEAST_DROPS = 6
@@ -32,6 +33,8 @@ def judge_resistance(campaign: Campaign, drops: Sequence[Found]) -> None:
     seen, depths, works = [], [], []
     for drop, found in zip(campaign.drops, drops, strict=True):
         depth, speed = found.numbers.get("penetration_depth_m"), found.numbers.get("impact_speed_m_s")
+        if drop.projectile.tip not in ROUND or drop.motion != Motion():
+            continue
         if depth is None or speed is None or found.trouble is not None or not depth > 0:
             continue
         if any(ratio is not None and is_odd(ratio) for ratio in (found.gravity, found.speed)):
