@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from .errors import CampaignError, LabsimError
@@ -27,10 +26,11 @@ def read_tip(table: Table, known: tuple[str, ...], beside: Path | None = None) -
         return name, ()
     from .sph.tips import SHELF
 
-    name, module = _find(table, "tip", name, SHELF.list(), SHELF.find, beside, "tips")
+    name = find_name(table, "tip", name, "tips", beside)
+    module = SHELF.find(name)
     if "axisymmetric" not in getattr(module, "GEOMETRIES", ("axisymmetric",)):
         raise table.wrong("tip", f"{name!r} is planar; write one of " + _quote(SHELF.list()))
-    return name, _read(table, f'tip = "{Path(name).stem}"', module.PARAMETERS)
+    return name, read_own(table, f'tip = "{Path(name).stem}"', module.PARAMETERS)
 
 
 def read_motion(table: Table, beside: Path | None = None, folder: Path = Path()) -> Motion:
@@ -39,14 +39,13 @@ def read_motion(table: Table, beside: Path | None = None, folder: Path = Path())
         return Motion()
     from .sph.motions import SHELF
 
-    kind, module = _find(
-        table, "kind", table.text("kind", "free"), SHELF.list(), SHELF.find, beside, "motions"
-    )
+    kind = find_name(table, "kind", table.text("kind", "free"), "motions", beside)
+    module = SHELF.find(kind)
     start = table.number("start_depth_mm", 0.0, 1000.0, unit=1e-3, default=0.0)
     path: tuple[tuple[float, float], ...] = ()
     if getattr(module, "TAKES_TABLE", False):
         path = _read_path(table, folder)
-    values = _read(table, f'kind = "{Path(kind).stem}"', module.PARAMETERS)
+    values = read_own(table, f'kind = "{Path(kind).stem}"', module.PARAMETERS)
     motion = Motion(kind, start, values, path)
     try:
         from .sph.motions import make_path
@@ -59,10 +58,11 @@ def read_motion(table: Table, beside: Path | None = None, folder: Path = Path())
 
 def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, tuple[float, float]]:
     """Material of a law that is not the dust's, the parameter that is calibrated, and its range (SI); the middle of it is in force."""
-    from .sph.materials import find_law, list_laws
+    from .sph.materials import find_law
     from .sph.plugins import key_of
 
-    law, module = _find(table, "law", table.text("law"), list_laws(), find_law, beside, "materials")
+    law = find_name(table, "law", table.text("law"), "materials", beside)
+    module = find_law(law)
     what = f'law = "{Path(law).stem}"'
     by_name = {each.name: each for each in module.PARAMETERS}
     first = by_name[module.CALIBRATED]
@@ -70,7 +70,7 @@ def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, t
     low, high = read_range(table, f"{first.name}_range{ending}", first.low / unit, first.high / unit)
     friction = table.number("contact_friction", 0.0, 5.0, default=0.0)
     others = tuple(each for each in module.PARAMETERS if each is not first)
-    values = ((first.name, math.sqrt(low * high) * unit), *_read(table, what, others))
+    values = ((first.name, math.sqrt(low * high) * unit), *read_own(table, what, others))
     return Material(contact_friction=friction, law=law, constants=values), first.name, (low * unit, high * unit)
 
 
@@ -95,29 +95,34 @@ def set_law(material: Material, table: Table) -> Material:
 
     what = f'law = "{Path(material.law).stem}"'
     friction = table.number("contact_friction", 0.0, 5.0, default=material.contact_friction)
-    values = dict(material.constants) | dict(_read(table, what, find_law(material.law).PARAMETERS))
+    values = dict(material.constants) | dict(read_own(table, what, find_law(material.law).PARAMETERS))
     return material.replace(contact_friction=friction, constants=tuple(values.items()))
 
 
-def _find(
-    table: Table, key: str, name: str, there: list[str], find: Any, beside: Path | None, folder: str
-) -> tuple[str, ModuleType]:
-    """A name of labsim's own, or the file of that name in the campaign's folder; and its module."""
+def find_name(table: Table, key: str, name: str, folder: str, beside: Path | None) -> str:
+    """A name of labsim's own ``tips``, ``motions`` or ``materials``, or the file of that name in the campaign's folder. Raises
+    CampaignError where there is none or it cannot be loaded."""
+    from .sph import materials, motions, tips
+
+    there, find = {
+        "tips": (tips.list_tips, tips.find_tip),
+        "motions": (motions.list_motions, motions.find_motion),
+        "materials": (materials.list_laws, materials.find_law),
+    }[folder]
     own = beside / folder / f"{name}.py" if beside is not None else None
     if own is not None and own.is_file():
         name = str(own)
-    elif name not in there and not (name.endswith(".py") and Path(name).is_file()):
+    elif name not in there() and not (name.endswith(".py") and Path(name).is_file()):
         where = f", or put {name}.py into the campaign's {folder}/" if beside is not None else ""
-        raise table.wrong(key, f"{name!r} is not known; write one of {_quote(there)}{where}")
+        raise table.wrong(key, f"{name!r} is not known; write one of {_quote(there())}{where}")
     try:
-        return name, find(name)
-    except LabsimError:
-        raise
+        find(name)
     except Exception as trouble:
         raise table.wrong(key, f"{name}: cannot be loaded ({type(trouble).__name__}: {trouble})") from None
+    return name
 
 
-def _read(table: Table, what: str, parameters: tuple[Any, ...]) -> Values:
+def read_own(table: Table, what: str, parameters: tuple[Any, ...]) -> Values:
     """The numbers of one that are written down, in SI; others are left to its defaults."""
     from .sph.plugins import key_of
 

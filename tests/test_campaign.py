@@ -123,7 +123,7 @@ MISTAKES = {
     "empty range": (_replace(C, "[300.0, 6000.0]", "[]"), [C, "p_m_range_Pa", "[]", "two pressures"]),
     "range backwards": (_replace(C, "[300.0, 6000.0]", "[6000.0, 300.0]"), [C, "p_m_range_Pa", "smaller"]),
     "range in kPa": (_replace(C, "[300.0, 6000.0]", "[0.3, 6.0]"), [C, "p_m_range_Pa", "0.3", "write 300"]),
-    "unknown tip": (_replace(D, '"hemisphere"', '"cone"'), [D, "projectile.tip", "cone", "hemisphere"]),
+    "unknown tip": (_replace(D, '"hemisphere"', '"wedge"'), [D, "projectile.tip", "wedge", "hemisphere"]),
     "unknown kind": (_replace(D, '"track"', '"film"'), [D, "record.kind", "film", "summary"]),
     "record gone": (_remove(T), [D, "record.file", "track.csv", "not there"]),
     "record empty": (lambda f: (f / T).write_text(""), [D, "record.file", "is empty"]),

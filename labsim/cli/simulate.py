@@ -1,4 +1,4 @@
-"""``labsim simulate``: one drop."""
+"""``labsim simulate``: one drop or push."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import typer
 from ..inference.run_file import write_run_file
 from ..inference.runs import RunStore, require_runs
 from ..sph import DropRun, check_setting, extrapolate, refine
+from ..sph.setting import base_area, say_motion, say_projectile
 from . import options
 from ._setting import Asked, make_setting
 
@@ -20,19 +21,22 @@ class Geometry(StrEnum):
     axisymmetric = "axisymmetric"
 
 
-class Tip(StrEnum):
-    hemisphere = "hemisphere"
-    sphere = "sphere"
-    cylinder = "cylinder"
-
-
 def simulate(
     out: options.Out = None,
     geometry: Annotated[
         Geometry | None, typer.Option(help="Default: axisymmetric, or the campaign's.")
     ] = None,
     tip: Annotated[
-        Tip | None, typer.Option(help="Default: hemisphere; planar runs are of a cylinder.")
+        str | None,
+        typer.Option(
+            help="hemisphere, sphere, cone, flat, ogive or a file NAME.py. Default: hemisphere, in the plane cylinder."
+        ),
+    ] = None,
+    motion: Annotated[
+        str | None, typer.Option(help="free (a drop), pushed, prescribed or a file NAME.py. Default: free.")
+    ] = None,
+    law: Annotated[
+        str | None, typer.Option(help="Of the material, or a file NAME.py. Default: porous_dust.")
     ] = None,
     tip_radius_mm: Annotated[float | None, typer.Option("--tip-radius-mm", help="Default: 0.5.")] = None,
     mass_mg: Annotated[
@@ -42,14 +46,18 @@ def simulate(
             help="Default: a glass bead of that radius. Planar: of the round bead that the cylinder stands for.",
         ),
     ] = None,
-    speed_m_s: Annotated[float | None, typer.Option("--speed-m-s", help="At contact. Default: 0.65.")] = None,
+    speed_m_s: Annotated[float | None, typer.Option("--speed-m-s", help="Of a drop at contact. Default: 0.65.")] = None,
     p_m_pa: Annotated[
         float | None, typer.Option("--p-m-Pa", help="Default: 1300, or the middle of the campaign's range.")
     ] = None,
     filling_factor: Annotated[float | None, typer.Option("--filling-factor", help="Default: 0.15.")] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", help="material.KEY=VALUE, any key of [material] in campaign.toml; repeatable."),
+        typer.Option(
+            "--set",
+            help="material.KEY=VALUE, projectile.KEY=VALUE or motion.KEY=VALUE: keys of [material] in campaign.toml, the "
+            "tip's own in [projectile] and [motion] in drop.toml; repeatable.",
+        ),
     ] = None,
     model: Annotated[
         Path | None,
@@ -77,11 +85,13 @@ def simulate(
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:
-    """Simulate one drop: run.h5, curve.csv, run.json, fields/, run.png, field.png."""
+    """Simulate one drop or push: run.h5, curve.csv, run.json, fields/, run.png, field.png."""
     setting, unseen = make_setting(
         Asked(
             geometry=geometry and geometry.value,
-            tip=tip and tip.value,
+            tip=tip,
+            motion=motion,
+            law=law,
             tip_radius_mm=tip_radius_mm,
             mass_mg=mass_mg,
             speed_m_s=speed_m_s,
@@ -146,14 +156,34 @@ def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:
             f"{summary['penetration_depth_m'] * 1e3:.4f} ± {summary['penetration_depth_m_sigma'] * 1e3:.4f}"
         )
         stop = f"{summary['stopping_time_s'] * 1e3:.3f} ± {summary['stopping_time_s_sigma'] * 1e3:.3f}"
-    options.write_json(folder / "run.json", summary)
     raw = "raw planar " if run.setting.geometry == "planar" else ""
-    lines = [
+    first = (
         f"{raw}depth {depth} mm, stopping time {stop} ms"
-        + (f" (extrapolated from {len(runs)} spacings)" if len(runs) > 1 else ""),
+        + (f" (extrapolated from {len(runs)} spacings)" if len(runs) > 1 else "")
+    )
+    if run.setting.path[0].size:
+        first = _say_push(run, summary)
+    options.write_json(folder / "run.json", summary)
+    lines = [
+        first,
         f"{run.particles.r.size} particles, {run.steps} steps, {run.wall:.1f} s, {run.updates_per_s / 1e6:.2f} million "
         f"updates/s; momentum off by {abs(run.momentum_error):.0e}, energy by {run.energy_error:+.1%}; artificial viscosity "
         f"took {run.viscous_share:.1%} of the energy",
         *(f"warning: {warning}" for warning in run.warnings),
     ]
     return summary, "\n".join(lines)
+
+
+def _say_push(run: DropRun, summary: dict) -> str:
+    """One line of a projectile that was led; its numbers go into the summary."""
+    area = base_area(run.setting)
+    last = run.force[run.depth > run.depth.max() - 0.2 * run.setting.projectile.tip_radius].mean()
+    unit = "N/m" if run.setting.geometry == "planar" else "N"
+    summary["driver_work_J"] = run.energies["driver"]
+    summary["force_at_depth_N"] = float(last)
+    summary["pressure_at_depth_Pa"] = float(last / area)
+    summary["force_max_N"] = float(run.force.max())
+    return (
+        f"{say_projectile(run.setting)}, {say_motion(run.setting)}: {last:.4g} {unit} over the last fifth of a tip radius, "
+        f"{last / area / 1e3:.4g} kPa of its section; largest {run.force.max():.4g} {unit}; work of the driver {run.energies['driver']:.4g} J"
+    )

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..records import FloatArray
 from ..sph import DropRun, particles
-from ..sph.drop import evolve
+from ..sph.drop import evolve, start_body
 from ..video.movie import write_movie
 from .look import STYLE
 from .run_figures import fill_density_field
@@ -23,7 +23,7 @@ def draw_movie(run: DropRun, path: Path) -> Path:
     """run.mp4. A stored run holds the dust at the stop only, so the drop is simulated once more for this."""
     setting = run.setting
     dust, wall = particles.place_particles(setting)
-    body = np.array([0.0, -setting.impact_speed, 0.0, 0.0, 0.0])
+    body = start_body(setting)
     seen: list[tuple[float, float, FloatArray]] = []
     kept = [particles.X, particles.Z, particles.DENSITY]
 

@@ -11,12 +11,15 @@ from scipy.spatial import KDTree
 from ..records import FloatArray
 from ..sph import DropRun, DropSetting
 from ..sph.profile import outline
+from ..sph.setting import base_area, say_material, say_motion, say_projectile
 from ..sph.tips import make_profile
 from .look import BLUE, GREY, INK, PHI, new_figure
 
 
 def draw_run(run: DropRun, path: Path) -> Path:
-    """Depth, velocity and force of one run, and where the dust went."""
+    """Depth, velocity and force of one drop against time; of a projectile that is led, force and pressure against depth."""
+    if run.setting.path[0].size:
+        return _draw_push(run, path)
     with new_figure(path, 7.2, 6.4) as figure:
         panels = figure.subplots(3, 1, sharex=True)
         planar = run.setting.geometry == "planar"
@@ -34,9 +37,29 @@ def draw_run(run: DropRun, path: Path) -> Path:
         panels[2].set_xlabel("time since contact (ms)")
         setting = run.setting
         panels[0].set_title(
-            f"{setting.projectile.tip} R {setting.projectile.tip_radius * 1e3:g} mm at {setting.impact_speed:g} m/s, "
-            f"p_m {setting.material.p_m / 1e3:.3g} kPa: depth {run.penetration_depth * 1e3:.3f} mm, "
-            f"T_s {run.stopping_time * 1e3:.2f} ms"
+            f"{say_projectile(setting)} at {say_motion(setting)}, {say_material(setting.material)}\n"
+            f"depth {run.penetration_depth * 1e3:.3f} mm, T_s {run.stopping_time * 1e3:.2f} ms",
+            fontsize=9,
+        )
+    return path
+
+
+def _draw_push(run: DropRun, path: Path) -> Path:
+    setting = run.setting
+    planar = setting.geometry == "planar"
+    area = base_area(setting)
+    with new_figure(path, 7.2, 4.4) as figure:
+        axes = figure.subplots()
+        # time goes along the line: on a way there and back the loop is the work that is lost
+        axes.plot(run.depth * 1e3, run.force, color=BLUE)
+        axes.axhline(0.0, color=GREY, lw=0.6)
+        axes.set(xlabel="depth of the tip (mm)", ylabel="force (N/m)" if planar else "force (N)")
+        pressure = axes.secondary_yaxis(
+            "right", functions=(lambda force: force / area / 1e3, lambda kilo: kilo * area * 1e3)
+        )
+        pressure.set_ylabel("force over the tip's largest section (kPa)")
+        axes.set_title(
+            f"{say_projectile(setting)}, {say_motion(setting)}\n{say_material(setting.material)}", fontsize=9
         )
     return path
 
@@ -51,7 +74,7 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
             (dust.r, dust.z, dust.filling_factor),
             run.penetration_depth,
             run.penetration_depth,
-            title or f"at the stop, {run.stopping_time * 1e3:.2f} ms",
+            title or f"at the {'end' if run.setting.path[0].size else 'stop'}, {run.stopping_time * 1e3:.2f} ms",
         )
     return path
 
@@ -81,7 +104,10 @@ def fill_density_field(
     reach = np.where(rows > 0.0, 0.5, 1.0)[:, None] * setting.spacing
     field = np.where(distance < reach, phi[nearest], np.nan)
     axes = figure.add_subplot()
-    drawn = axes.pcolormesh(columns * 1e3, rows * 1e3, field, **PHI, rasterized=True)
+    scale = PHI
+    if setting.material.law != "porous_dust":  # others hardly change their volume, at any filling factor
+        scale = {**PHI, "vmin": 0.95 * setting.filling_factor, "vmax": 1.05 * setting.filling_factor}
+    drawn = axes.pcolormesh(columns * 1e3, rows * 1e3, field, **scale, rasterized=True)
     x, y = outline(make_profile(setting.projectile), max(2.0 * radius + depth, 2.0 * radius))
     x, y = np.concatenate([-x[::-1], x]), np.concatenate([y[::-1], y]) - depth
     axes.fill(x * 1e3, y * 1e3, facecolor="#DDDDDD", edgecolor=INK, lw=1.2)
@@ -91,5 +117,5 @@ def fill_density_field(
     axes.set_ylim(-deep * 1e3, 1.2 * radius * 1e3)
     figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
     axes.set_title(
-        f"{2e3 * radius:g} mm at {setting.impact_speed:g} m/s, p_m {setting.material.p_m / 1e3:.2f} kPa, {when}"
+        f"{say_projectile(setting)}, {say_motion(setting)}\n{say_material(setting.material)}, {when}", fontsize=9
     )

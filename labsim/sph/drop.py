@@ -188,9 +188,7 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     check_setting(setting)
     began = time.perf_counter()
     dust, wall = place_particles(setting)
-    time_knots, led = setting.path
-    speed = (led[1] - led[0]) / time_knots[1] if led.size else setting.impact_speed
-    body = np.array([-setting.motion.start_depth, -speed, 0.0, 0.0, 0.0])
+    body = start_body(setting)
     watch = None if progress is None else lambda reached, state: progress(reached)
     _fill_elastic(setting, dust)
     result = evolve(setting, dust, wall, body, watch)
@@ -199,6 +197,13 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
         setting, result.log, result.stop_step, result.at_stop, result.state,
         dust, wall, per_unit, result.rebuilds, time.perf_counter() - began,
     )  # fmt: skip
+
+
+def start_body(setting: DropSetting) -> FloatArray:
+    """The projectile at the start, as ``evolve`` takes it."""
+    time, led = setting.path
+    speed = (led[1] - led[0]) / time[1] if led.size else setting.impact_speed
+    return np.array([-setting.motion.start_depth, -speed, 0.0, 0.0, 0.0])
 
 
 def _blown_up(setting: DropSetting, steps: int, reached: float) -> SimulationError:

@@ -90,7 +90,7 @@ class DropSetting:
         if led.size:
             return float(led.max())
         radius = self.projectile.tip_radius
-        area = 2 * radius if self.geometry == "planar" else math.pi * radius**2
+        area = base_area(self)
         strength = max(find_law(self.material.law).resistance(self), 1.0)
         # softer dust lets it through to where the bottom would be felt
         return self.motion.start_depth + float(
@@ -170,6 +170,12 @@ def check_setting(setting: DropSetting) -> None:
         )
 
 
+def base_area(setting: DropSetting) -> float:
+    """Section (m²; planar: width, m) of a circle of the tip radius."""
+    radius = setting.projectile.tip_radius
+    return 2 * radius if setting.geometry == "planar" else math.pi * radius**2
+
+
 def say_projectile(setting: DropSetting) -> str:
     """Tip, radius, and the tip's own numbers that are not at their defaults."""
     own = {each.name: each for each in find_tip(setting.projectile.tip).PARAMETERS}
@@ -200,5 +206,5 @@ def say_material(material: Material) -> str:
 
 
 def _say_value(parameter: Parameter, value: float) -> str:
-    ending, unit = key_of(parameter)
-    return f"{parameter.name} {value / unit:.4g} {ending[1:]}".rstrip()
+    key, unit = key_of(parameter)
+    return f"{parameter.name.replace('_', ' ')} {value / unit:.4g} {key.removeprefix(parameter.name)[1:]}".rstrip()
