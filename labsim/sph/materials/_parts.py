@@ -72,3 +72,39 @@ def exponential(y):
     e *= e
     e *= e
     return e * e
+
+
+@compiled
+def find_strain_rates(lxx, lzz, lxz, lzx, div):
+    """Deviatoric strain rates xx, zz, xz and the spin, 1/s, of a velocity gradient whose trace, hoop strain included, is ``div``."""
+    third = 1.0 / 3.0
+    return lxx - div * third, lzz - div * third, 0.5 * (lxz + lzx), 0.5 * (lxz - lzx)
+
+
+@compiled
+def shear_elastically(dt, shear, exx, ezz, exz, spin, sxx, szz, sxz):
+    """Deviatoric stress xx, zz, xz (Pa) after a step with Jaumann's rate and the shear modulus ``shear`` (Pa)."""
+    a = sxx + dt * (2.0 * shear * exx + 2.0 * spin * sxz)
+    c = szz + dt * (2.0 * shear * ezz - 2.0 * spin * sxz)
+    b = sxz + dt * (2.0 * shear * exz + spin * (szz - sxx))
+    return a, c, b
+
+
+@compiled
+def measure_shear(a, c, b):
+    """3 J2 of a deviatoric stress xx, zz, xz, Pa²: the square of q."""
+    return 1.5 * (a * a + c * c + (a + c) * (a + c)) + 3.0 * b * b
+
+
+@compiled
+def return_radially(a, c, b, yield2):
+    """Deviatoric stress xx, zz, xz, shortened to √(3 J2) = √yield2 where it is longer."""
+    q2 = measure_shear(a, c, b)
+    f = math.sqrt(yield2 / max(max(q2, yield2), 1.0e-300))
+    return a * f, c * f, b * f
+
+
+@compiled
+def find_power(div, exx, ezz, exz, hoop, p, sxx, szz, sxz):
+    """Power of pressure and deviatoric stress on a strain rate, W/m³."""
+    return -p * div + sxx * exx + szz * ezz + 2.0 * sxz * exz - (sxx + szz) * (hoop - div * (1.0 / 3.0))

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...records import FloatArray, Material
 from .._jit import compiled
-from ._parts import exponential
+from ._parts import exponential, find_power, find_strain_rates, return_radially, shear_elastically
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -255,20 +255,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         crushing[i] += 0.2 * (max(x - phi_zero[i], 0.0) / phi_zero[i] * per_dt - crushing[i])
         phi_zero[i] = x
         shear = shear_to_bulk * k
-        exx = lxx[i] - div * third
-        ezz = lzz[i] - div * third
-        exz = 0.5 * (lxz[i] + lzx[i])
-        spin = 0.5 * (lxz[i] - lzx[i])
-        a = sxx_old + dt * (2.0 * shear * exx + 2.0 * spin * sxz_old)
-        c = szz_old + dt * (2.0 * shear * ezz - 2.0 * spin * sxz_old)
-        b = sxz_old + dt * (2.0 * shear * exz + spin * (szz_old - sxx_old))
-        q2 = 1.5 * (a * a + c * c + (a + c) * (a + c)) + 3.0 * b * b
-        yield2 = shear_factor * shear_factor * strength * tension
-        f = math.sqrt(yield2 / max(max(q2, yield2), 1.0e-300))
-        a *= f
-        b *= f
-        c *= f
-        h = -(a + c)
+        exx, ezz, exz, spin = find_strain_rates(lxx[i], lzz[i], lxz[i], lzx[i], div)
+        a, c, b = shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
+        a, c, b = return_radially(a, c, b, shear_factor * shear_factor * strength * tension)
         sxx[i], szz[i], sxz[i] = a, c, b
         total = p
         stiffness = k * phi / x * (1.0 + 4.0 * third * shear_to_bulk)
@@ -277,14 +266,10 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
             stiffness += gas_pressure * phi * (1.0 - phi_initial[i]) / (1.0 - phi) ** 2
         pressure[i] = total
         sound[i] = math.sqrt(stiffness / rho_new)
-        h_old = -(sxx_old + szz_old)
-        work[i] += (
-            dt * (
-                -(p_old + total) * div
-                + (sxx_old + a) * exx + (szz_old + c) * ezz + 2.0 * (sxz_old + b) * exz
-                + (h_old + h) * (hoop - div * third)
-            ) / (rho_old + rho_new)
-        )  # fmt: skip
+        power = find_power(
+            div, exx, ezz, exz, hoop, p_old + total, sxx_old + a, szz_old + c, sxz_old + b
+        )  # of twice the mean stress
+        work[i] += dt * power / (rho_old + rho_new)
         exchanged[i] += dt * (p_old + total) * exchange[i] / (rho_old + rho_new)
 
 

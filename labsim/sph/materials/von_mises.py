@@ -15,7 +15,16 @@ import numpy as np
 
 from labsim.records import FloatArray
 from labsim.sph._jit import compiled
-from labsim.sph.materials._parts import Parameter, exponential, read_parameters, refuse_terms
+from labsim.sph.materials._parts import (
+    Parameter,
+    exponential,
+    find_power,
+    read_parameters,
+    refuse_terms,
+    return_radially,
+    shear_elastically,
+    find_strain_rates,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -114,26 +123,14 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         trial = bulk * (rho_new / reference[i] - 1.0)
         p = max(trial, -tension)
         reference[i] = rho_new / (1.0 + p / bulk) if p != trial else reference[i]
-        exx = lxx[i] - div * third
-        ezz = lzz[i] - div * third
-        exz = 0.5 * (lxz[i] + lzx[i])
-        spin = 0.5 * (lxz[i] - lzx[i])
-        a = sxx_old + dt * (2.0 * shear * exx + 2.0 * spin * sxz_old)
-        c = szz_old + dt * (2.0 * shear * ezz - 2.0 * spin * sxz_old)
-        b = sxz_old + dt * (2.0 * shear * exz + spin * (szz_old - sxx_old))
-        q2 = 1.5 * (a * a + c * c + (a + c) * (a + c)) + 3.0 * b * b
-        f = math.sqrt(yield2 / max(q2, yield2))
-        a *= f
-        b *= f
-        c *= f
+        exx, ezz, exz, spin = find_strain_rates(lxx[i], lzz[i], lxz[i], lzx[i], div)
+        a, c, b = shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
+        a, c, b = return_radially(a, c, b, yield2)
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * rho_new / reference[i] + 4.0 * third * shear) / rho_new)
         crushing[i] = 0.0  # nothing is crushed, so nothing is exchanged
-        h_old, h = -(sxx_old + szz_old), -(a + c)
-        work[i] += (
-            dt * (
-                -(p_old + p) * div + (sxx_old + a) * exx + (szz_old + c) * ezz + 2.0 * (sxz_old + b) * exz
-                + (h_old + h) * (hoop - div * third)
-            ) / (rho_old + rho_new)
-        )  # fmt: skip
+        power = find_power(
+            div, exx, ezz, exz, hoop, p_old + p, sxx_old + a, szz_old + c, sxz_old + b
+        )  # of twice the mean stress
+        work[i] += dt * power / (rho_old + rho_new)
         exchanged[i] += dt * (p_old + p) * exchange[i] / (rho_old + rho_new)
