@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from ...errors import SimulationError
+from ...records import FloatArray
 from .._jit import compiled
+from . import find_law
 
 if TYPE_CHECKING:
     from ..setting import DropSetting
+    from ..state import Rows
 
 TERMS = {
     "strength_rate": 0.0,
@@ -33,8 +38,50 @@ class Parameter:
     source: str
 
 
-def read_parameters(setting: DropSetting, parameters: tuple[Parameter, ...]) -> list[float]:
-    """The values of a law's parameters, in their order. Raises SimulationError where one is unknown or beyond its limits."""
+class Calibrated(NamedTuple):
+    """The parameter that a calibration asks for where nothing else is said, and between which values."""
+
+    name: str
+    low: float
+    high: float
+
+
+RATE = (
+    Parameter("rate_eta", "s^n", 0.0, 1e3, 0.0, "none; viscous overstress, Perzyna (1966)"),
+    Parameter("rate_exponent", "1", 0.0, 1.0, 0.5, "square root of the rate; matters with rate_eta alone"),
+    Parameter("rate_log", "1", 0.0, 1.0, 0.0, "none; clay 0.05 to 0.2 a decade, Einav & Randolph (2005)"),
+    Parameter(
+        "rate_reference", "1/s", 1e-9, 1e6, 3e-6, "laboratory shear test of 1 % an hour; with rate_log alone"
+    ),
+)
+
+
+class Rate(NamedTuple):
+    """Strength (1 + eta ε̇^exponent) (1 + log log10(ε̇/reference)), the second factor never below one; rates in 1/s."""
+
+    eta: float
+    exponent: float
+    log: float
+    reference: float
+    on: tuple[int, ...]  # empty: strength does not depend on the rate. A type, so known to the compiler
+
+
+def _read_rate(setting: DropSetting, eta: float, exponent: float, log: float, reference: float) -> Rate:
+    """``strength_rate`` of a setting, an effect, is ``rate_eta`` by another name; both at once are refused."""
+    if setting.strength_rate != 0.0:
+        if eta != 0.0:
+            raise SimulationError(
+                "simulation", "strength_rate", "is the law's rate_eta by another name; give one of them"
+            )
+        eta, exponent = setting.strength_rate, setting.strength_rate_exponent
+    return Rate(eta, exponent, log, reference, (1,) if eta > 0.0 or log > 0.0 else ())
+
+
+def read_parameters(setting: DropSetting, parameters: tuple[Parameter, ...]) -> list[Any]:
+    """The values of a law's parameters, in their order; RATE, at the end, becomes one Rate.
+
+    Raises SimulationError where one is unknown or beyond its limits.
+    """
     given = dict(setting.material.constants)
     known = {each.name for each in parameters}
     for name in given:
@@ -50,7 +97,12 @@ def read_parameters(setting: DropSetting, parameters: tuple[Parameter, ...]) -> 
                 f"material.{each.name}",
                 f"is {value!r} {each.unit}; use {each.low:g} to {each.high:g}",
             )
-    return [given.get(each.name, each.default) for each in parameters]
+    values: list[Any] = [given.get(each.name, each.default) for each in parameters]
+    return (
+        [*values[: -len(RATE)], _read_rate(setting, *values[-len(RATE) :])]
+        if RATE[0] in parameters
+        else values
+    )
 
 
 def refuse_terms(setting: DropSetting, allowed: tuple[str, ...] = ()) -> None:
@@ -60,6 +112,33 @@ def refuse_terms(setting: DropSetting, allowed: tuple[str, ...] = ()) -> None:
             raise SimulationError(
                 "simulation", name, f"the law {setting.material.law} has no such term; leave it {null!r}"
             )
+
+
+class Tables(NamedTuple):
+    """Of a law that looks nothing up."""
+
+    none: FloatArray
+
+
+def make_tables(setting: DropSetting) -> Tables:
+    """Of a law that looks nothing up."""
+    return Tables(np.zeros(1))
+
+
+def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
+    """Of a law that no pressure crushes."""
+    return np.full_like(phi, np.inf)
+
+
+def sound_speed(setting: DropSetting) -> float:
+    """Of compression waves in undisturbed matter, m/s, as the law's start has it."""
+    phi = np.array([setting.filling_factor])
+    return float(find_law(setting.material.law).start(setting, phi, 0.0)[1][0])
+
+
+def find_warnings(setting: DropSetting, s: Rows, own: Any) -> list[str]:
+    """Of a law that has nothing to say at the stop."""
+    return []
 
 
 @compiled
@@ -76,7 +155,7 @@ def exponential(y):
 
 @compiled
 def find_strain_rates(lxx, lzz, lxz, lzx, div):
-    """Deviatoric strain rates xx, zz, xz and the spin, 1/s, of a velocity gradient whose trace, hoop strain included, is ``div``."""
+    """Deviatoric strain rates xx, zz, xz and the spin, 1/s, of a velocity gradient; ``div`` with the hoop strain."""
     third = 1.0 / 3.0
     return lxx - div * third, lzz - div * third, 0.5 * (lxz + lzx), 0.5 * (lxz - lzx)
 
@@ -108,3 +187,20 @@ def return_radially(a, c, b, yield2):
 def find_power(div, exx, ezz, exz, hoop, p, sxx, szz, sxz):
     """Power of pressure and deviatoric stress on a strain rate, W/m³."""
     return -p * div + sxx * exx + szz * ezz + 2.0 * sxz * exz - (sxx + szz) * (hoop - div * (1.0 / 3.0))
+
+
+@compiled
+def strengthen(strain_rate, rate):
+    """Factor on a strength at a strain rate, 1/s: -div v against compaction, ``find_shear_rate`` against shear."""
+    factor = 1.0
+    if rate.eta > 0.0:
+        factor *= 1.0 + rate.eta * strain_rate**rate.exponent
+    if rate.log > 0.0:
+        factor *= 1.0 + rate.log * math.log10(max(strain_rate / rate.reference, 1.0))
+    return factor
+
+
+@compiled
+def find_shear_rate(exx, ezz, exz):
+    """√(2/3 e:e) of a deviatoric strain rate, 1/s: what the axis of a triaxial test strains at when its volume stays."""
+    return 2.0 / 3.0 * math.sqrt(measure_shear(exx, ezz, exz))

@@ -7,7 +7,7 @@
 The strengths depend on φ alone and are tabulated; between φ1 + 0.002 and φ2 - 0.002 the table is the formula, below it
 Σ keeps its value there (a powder without strength would never come to rest), above it goes on along the tangent.
 The deviatoric stress follows Jaumann's rate and returns radially to √(3 J2) = Y (von Mises, hoop stress included).
-Two optional terms: Σ (1 + η ε̇ⁿ) with ε̇ the rate of compression, and trapped gas p + P0 ((1 - φi)/(1 - φ) - 1).
+Optional terms: Σ (1 + η ε̇ⁿ) (1 + μ log10(ε̇/ε̇0)) with ε̇ the rate of compression; trapped gas p + P0 ((1 - φi)/(1 - φ) - 1).
 """
 
 from __future__ import annotations
@@ -19,7 +19,19 @@ import numpy as np
 
 from ...records import FloatArray, Material
 from .._jit import compiled
-from ._parts import exponential, find_power, find_strain_rates, return_radially, shear_elastically
+from ._parts import (
+    RATE,
+    Calibrated,
+    Parameter,
+    Rate,
+    exponential,
+    find_power,
+    find_strain_rates,
+    read_parameters,
+    return_radially,
+    shear_elastically,
+    strengthen,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,6 +39,22 @@ if TYPE_CHECKING:
     from ..setting import DropSetting
     from ..state import Rows
 
+PARAMETERS = (  # those of the rate are in Material.constants, all others fields of Material, with the limits of campaigns
+    Parameter("p_m", "Pa", 1.0, 1e8, Material.p_m, "Güttler et al. (2009), eq. 6, dynamic compression"),
+    Parameter("phi_1", "1", 0.0, 0.74, Material.phi_1, "Güttler et al. (2009), eq. 6"),
+    Parameter("phi_2", "1", 0.01, 1.0, Material.phi_2, "Güttler et al. (2009), eq. 6"),
+    Parameter("delta", "1", 0.01, 5.0, Material.delta, "Güttler et al. (2009), eq. 6"),
+    Parameter("tensile_log10_a", "1", -5.0, 9.0, Material.tensile_log10_a, "Güttler et al. (2009), eq. 5"),
+    Parameter("tensile_log10_b", "1", -20.0, 20.0, Material.tensile_log10_b, "Güttler et al. (2009), eq. 5"),
+    Parameter("shear_factor", "1", 0.0, 100.0, Material.shear_factor, "Sirono (2004)"),
+    Parameter(
+        "bulk_modulus", "Pa", 100.0, 1e9, Material.bulk_modulus, "at φ 0.15; others use 4.5 to 300 kPa"
+    ),
+    Parameter("bulk_exponent", "1", 0.0, 15.0, Material.bulk_exponent, "Sirono (2004)"),
+    Parameter("shear_to_bulk", "1", 1e-3, 1.5, Material.shear_to_bulk, "Poisson's ratio 0.29"),
+    *RATE,
+)
+CALIBRATED = Calibrated("p_m", 300.0, 6000.0)
 REFERENCE_FILLING_FACTOR = 0.15  # where bulk_modulus is stated
 EDGE = 0.002  # distance in φ from the poles of Σ at which the table leaves the formula
 TABLE_SIZE = 8193
@@ -101,8 +129,7 @@ class Constants(NamedTuple):
     bulk_exponent: float
     shear_to_bulk: float
     shear_factor: float
-    rate: float
-    rate_exponent: float
+    rate: Rate
     gas_pressure: float
     extras: tuple[int, ...]  # empty: no rate term, no gas, exponent 4 of K. A type, so known to the compiler
 
@@ -136,6 +163,7 @@ def resistance(setting: DropSetting) -> float:
 def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
     """Refuse (key, reason) what lies outside the limits of the law."""
     material = setting.material
+    make_constants(setting)
     low, high = material.phi_1, material.phi_2
     reachable = [setting.filling_factor, setting.filling_factor + setting.crust_excess]
     graded = min(setting.extent[1], setting.graded_depth)
@@ -164,11 +192,12 @@ def find_warnings(setting: DropSetting, s: Rows, own: State) -> list[str]:
 def make_constants(setting: DropSetting) -> Constants:
     """The numbers of the law as the compiled update wants them."""
     material = setting.material
-    plain = material.bulk_exponent == 4.0 and setting.strength_rate == 0.0 and setting.pore_gas == 0.0
+    (rate,) = read_parameters(setting, RATE)
+    plain = material.bulk_exponent == 4.0 and not rate.on and setting.pore_gas == 0.0
+    extras = () if plain else (1,)
     return Constants(
         setting.monomer_density, material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk,
-        material.shear_factor, setting.strength_rate, setting.strength_rate_exponent, setting.pore_gas,
-        () if plain else (1,),
+        material.shear_factor, rate._replace(on=extras), setting.pore_gas, extras,
     )  # fmt: skip
 
 
@@ -208,7 +237,6 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         constants.shear_factor,
         constants.gas_pressure,
     )
-    rate_eta, rate_n = constants.rate, constants.rate_exponent
     plain = len(constants.extras) == 0
     strength_table, tension_table = tables.compressive, tables.tensile
     r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
@@ -240,8 +268,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         phi = rho_new * inverse_solid
         strength, tension = compressive[i], tensile[i]
         p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
-        if not plain and rate_eta > 0.0 and div < 0.0:
-            strength *= 1.0 + rate_eta * (-div) ** rate_n
+        if not plain and div < 0.0:
+            strength *= strengthen(-div, constants.rate)
         x = phi_zero[i]
         k = k0 * _raise_to(x * (1.0 / 0.15), gamma, plain)
         trial = k * (phi / x - 1.0)

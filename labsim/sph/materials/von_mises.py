@@ -15,16 +15,7 @@ import numpy as np
 
 from labsim.records import FloatArray
 from labsim.sph._jit import compiled
-from labsim.sph.materials._parts import (
-    Parameter,
-    exponential,
-    find_power,
-    read_parameters,
-    refuse_terms,
-    return_radially,
-    shear_elastically,
-    find_strain_rates,
-)
+from labsim.sph.materials import _parts as parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,12 +24,13 @@ if TYPE_CHECKING:
     from labsim.sph.state import Rows
 
 PARAMETERS = (
-    Parameter("cohesion", "Pa", 1e-3, 1e9, 5e3, "soft clay, undrained"),
-    Parameter("shear_modulus", "Pa", 1.0, 1e11, 5e5, "rigidity 100 of soft clay"),
-    Parameter("bulk_modulus", "Pa", 1.0, 1e12, 5e6, "ten times shear: Poisson's ratio 0.45"),
-    Parameter("tension", "Pa", 0.0, 1e12, 1e12, "none: holds together"),
+    parts.Parameter("cohesion", "Pa", 1e-3, 1e9, 5e3, "soft clay, undrained"),
+    parts.Parameter("shear_modulus", "Pa", 1.0, 1e11, 5e5, "rigidity 100 of soft clay"),
+    parts.Parameter("bulk_modulus", "Pa", 1.0, 1e12, 5e6, "ten times shear: Poisson's ratio 0.45"),
+    parts.Parameter("tension", "Pa", 0.0, 1e12, 1e12, "none: holds together"),
+    *parts.RATE,
 )
-CALIBRATED = "cohesion"
+CALIBRATED = parts.Calibrated("cohesion", 1e2, 1e6)
 
 
 class State(NamedTuple):
@@ -50,20 +42,17 @@ class Constants(NamedTuple):
     shear_modulus: float
     bulk_modulus: float
     tension: float
+    rate: parts.Rate
 
 
-class Tables(NamedTuple):
-    """This law looks nothing up."""
-
-    none: FloatArray
+make_tables = parts.make_tables  # nothing is looked up
+sound_speed = parts.sound_speed
+find_warnings = parts.find_warnings  # none
+bearable_pressure = parts.bearable_pressure  # any
 
 
 def make_constants(setting: DropSetting) -> Constants:
-    return Constants(*read_parameters(setting, PARAMETERS))
-
-
-def make_tables(setting: DropSetting) -> Tables:
-    return Tables(np.zeros(1))
+    return Constants(*parts.read_parameters(setting, PARAMETERS))
 
 
 def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -> tuple[State, FloatArray]:
@@ -74,25 +63,13 @@ def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -
     return State(density / (1 + pressure / law.bulk_modulus)), sound
 
 
-def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
-    return np.full_like(phi, np.inf)
-
-
 def resistance(setting: DropSetting) -> float:
     return 8.0 * make_constants(setting).cohesion  # about what a deep tip meets
 
 
-def sound_speed(setting: DropSetting) -> float:
-    return float(start(setting, np.array([setting.filling_factor]), 0.0)[1][0])
-
-
 def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
     make_constants(setting)
-    refuse_terms(setting)
-
-
-def find_warnings(setting: DropSetting, s: Rows, own: State) -> list[str]:
-    return []
+    parts.refuse_terms(setting, ("strength_rate",))
 
 
 def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
@@ -118,18 +95,21 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         hoop = hoops * vr[i] / r[i]
         div = lxx[i] + lzz[i] + hoop
         rho_old = rho[i]
-        rho_new = rho_old * exponential(-dt * (div + exchange[i]))
+        rho_new = rho_old * parts.exponential(-dt * (div + exchange[i]))
         p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
         trial = bulk * (rho_new / reference[i] - 1.0)
         p = max(trial, -tension)
         reference[i] = rho_new / (1.0 + p / bulk) if p != trial else reference[i]
-        exx, ezz, exz, spin = find_strain_rates(lxx[i], lzz[i], lxz[i], lzx[i], div)
-        a, c, b = shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
-        a, c, b = return_radially(a, c, b, yield2)
+        exx, ezz, exz, spin = parts.find_strain_rates(lxx[i], lzz[i], lxz[i], lzx[i], div)
+        a, c, b = parts.shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
+        limit2 = yield2
+        if len(constants.rate.on) > 0:
+            limit2 *= parts.strengthen(parts.find_shear_rate(exx, ezz, exz), constants.rate) ** 2
+        a, c, b = parts.return_radially(a, c, b, limit2)
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * rho_new / reference[i] + 4.0 * third * shear) / rho_new)
         crushing[i] = 0.0  # nothing is crushed, so nothing is exchanged
-        power = find_power(
+        power = parts.find_power(
             div, exx, ezz, exz, hoop, p_old + p, sxx_old + a, szz_old + c, sxz_old + b
         )  # of twice the mean stress
         work[i] += dt * power / (rho_old + rho_new)
