@@ -109,7 +109,9 @@ def read_drop(path: Path | str) -> Drop:
     sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" else drop.number(
         "sequence", 0, 100000, whole=True
     )  # fmt: skip
-    height = drop.measured("height_mm", 0.0, 5000.0, unit=1e-3, required=kind != "summary" and motion.kind == "free")
+    height = drop.measured(
+        "height_mm", 0.0, 5000.0, unit=1e-3, required=kind != "summary" and motion.kind == "free"
+    )
     camera, published = None, None
     if kind == "summary":
         if document.has("camera"):

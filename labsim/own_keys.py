@@ -71,16 +71,18 @@ def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, t
     friction = table.number("contact_friction", 0.0, 5.0, default=0.0)
     others = tuple(each for each in module.PARAMETERS if each is not first)
     values = ((first.name, math.sqrt(low * high) * unit), *read_own(table, what, others))
-    return Material(contact_friction=friction, law=law, constants=values), first.name, (low * unit, high * unit)
+    return (
+        Material(contact_friction=friction, law=law, constants=values),
+        first.name,
+        (low * unit, high * unit),
+    )
 
 
 def read_range(table: Table, key: str, least: float, most: float) -> tuple[float, float]:
     """Two numbers between which a strength is looked for, in the key's unit."""
     found = table.get(key)
     if not isinstance(found, list) or len(found) != 2:
-        raise table.wrong(
-            key, f"{found!r} is not a range; write two pressures in Pa as [300.0, 6000.0]"
-        )
+        raise table.wrong(key, f"{found!r} is not a range; write two pressures in Pa as [300.0, 6000.0]")
     for value in found:
         table.check_number(key, value, least, most)
     low, high = map(float, found)

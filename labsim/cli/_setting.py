@@ -168,7 +168,9 @@ def _choose_motion(asked: Asked, drop: Drop | None, given: dict[str, Any], besid
     if asked.motion is not None or given:
         if asked.motion is None and drop is not None and motion != Motion():
             raise LabsimError(
-                COMMAND, "--set motion", f"{drop.name} states its own [motion]; give --motion too, to replace it"
+                COMMAND,
+                "--set motion",
+                f"{drop.name} states its own [motion]; give --motion too, to replace it",
             )
         table = Table(Path(COMMAND), "--set motion", {"kind": asked.motion or "free", **given})
         motion = read_motion(table, beside)
@@ -180,7 +182,9 @@ def _choose_motion(asked: Asked, drop: Drop | None, given: dict[str, Any], besid
     return motion
 
 
-def _choose_material(asked: Asked, material: Material, given: dict[str, Any], beside: Path | None) -> Material:
+def _choose_material(
+    asked: Asked, material: Material, given: dict[str, Any], beside: Path | None
+) -> Material:
     if asked.law is not None:
         law = find_name(_options("--law", asked.law), "--law", asked.law, "materials", beside)
         if law != material.law:
@@ -189,7 +193,9 @@ def _choose_material(asked: Asked, material: Material, given: dict[str, Any], be
         return _apply(given, material)
     for option, value in (("--p-m-Pa", asked.p_m_pa), ("--model", asked.model)):
         if value is not None:
-            raise LabsimError(COMMAND, option, f'is of {DUST}; leave it out with law "{Path(material.law).stem}"')
+            raise LabsimError(
+                COMMAND, option, f'is of {DUST}; leave it out with law "{Path(material.law).stem}"'
+            )
     table = Table(Path(COMMAND), "--set material", given)
     material = set_law(material, table)
     table.close()

@@ -46,7 +46,9 @@ def simulate(
             help="Default: a glass bead of that radius. Planar: of the round bead that the cylinder stands for.",
         ),
     ] = None,
-    speed_m_s: Annotated[float | None, typer.Option("--speed-m-s", help="Of a drop at contact. Default: 0.65.")] = None,
+    speed_m_s: Annotated[
+        float | None, typer.Option("--speed-m-s", help="Of a drop at contact. Default: 0.65.")
+    ] = None,
     p_m_pa: Annotated[
         float | None, typer.Option("--p-m-Pa", help="Default: 1300, or the middle of the campaign's range.")
     ] = None,
@@ -157,9 +159,8 @@ def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:
         )
         stop = f"{summary['stopping_time_s'] * 1e3:.3f} ± {summary['stopping_time_s_sigma'] * 1e3:.3f}"
     raw = "raw planar " if run.setting.geometry == "planar" else ""
-    first = (
-        f"{raw}depth {depth} mm, stopping time {stop} ms"
-        + (f" (extrapolated from {len(runs)} spacings)" if len(runs) > 1 else "")
+    first = f"{raw}depth {depth} mm, stopping time {stop} ms" + (
+        f" (extrapolated from {len(runs)} spacings)" if len(runs) > 1 else ""
     )
     if run.setting.path[0].size:
         first = _say_push(run, summary)

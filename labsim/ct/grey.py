@@ -95,7 +95,9 @@ def warn_of_grey(grey: GreyCheck, surface: Surface, bead: Bead, scan: Scan, leve
     if grey.saturated > 0.001:
         warnings.append(f"{grey.saturated:.2%} of the voxels outside the bead sit at the top of the range")
     if bead.saturated:
-        warnings.append("the bead is saturated: its density cannot be read, so its mass_mg is not checked from above; a wider window of grey levels at export would show it")
+        warnings.append(
+            "the bead is saturated: its density cannot be read, so its mass_mg is not checked from above; a wider window of grey levels at export would show it"
+        )
     if abs(grey.filling_factor_air) > 0.003:
         warnings.append(
             f"air reads a filling factor of {grey.filling_factor_air:+.4f}; "

@@ -18,8 +18,8 @@ from .grid import Family, RunGrid, few_positions, speed_nodes
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
 from .scans import ObservedScan, ScanModel
-from .undisturbed import UndisturbedDust
 from .supported import refuse_others
+from .undisturbed import UndisturbedDust
 from .workbench import Workbench
 
 SCAN_MARGIN = 1.06

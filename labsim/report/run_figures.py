@@ -74,7 +74,8 @@ def draw_density_field(run: DropRun, path: Path, title: str | None = None) -> Pa
             (dust.r, dust.z, dust.filling_factor),
             run.penetration_depth,
             run.penetration_depth,
-            title or f"at the {'end' if run.setting.path[0].size else 'stop'}, {run.stopping_time * 1e3:.2f} ms",
+            title
+            or f"at the {'end' if run.setting.path[0].size else 'stop'}, {run.stopping_time * 1e3:.2f} ms",
         )
     return path
 
@@ -117,5 +118,6 @@ def fill_density_field(
     axes.set_ylim(-deep * 1e3, 1.2 * radius * 1e3)
     figure.colorbar(drawn, ax=axes, label="volume filling factor φ", extend="both", shrink=0.85)
     axes.set_title(
-        f"{say_projectile(setting)}, {say_motion(setting)}\n{say_material(setting.material)}, {when}", fontsize=9
+        f"{say_projectile(setting)}, {say_motion(setting)}\n{say_material(setting.material)}, {when}",
+        fontsize=9,
     )

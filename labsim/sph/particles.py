@@ -85,9 +85,7 @@ def place_particles(setting: DropSetting) -> tuple[FloatArray, np.ndarray]:
     state = fill_at_rest(setting, x, z, phi, np.minimum(weight_above, bearable))
     edge = width if axisymmetric else width / 2
     if setting.motion.start_depth > 0.0:
-        clear = (
-            measure_distance(x, z, -setting.motion.start_depth, make_profile(setting.projectile)) > 0.0
-        )
+        clear = measure_distance(x, z, -setting.motion.start_depth, make_profile(setting.projectile)) > 0.0
         x, z, state = x[clear], z[clear], np.ascontiguousarray(state[:, clear])
     wall = (z < -depth + WALL_LAYERS * spacing) | (np.abs(x) > edge - WALL_LAYERS * spacing)
     return state, wall

@@ -70,7 +70,9 @@ def walk(pieces: tuple[Piece, ...]) -> FloatArray:
         if r < -1e-9 * max(abs(z), 1e-6):
             _refuse(f"the outline crosses the axis at {r:.3g} m")
     if not (math.isinf(z) or abs(r) <= 1e-9 * abs(z)):
-        _refuse(f"the outline ends in the open, at r {r:.3g} m, z {z:.3g} m; end it on a shaft or on the axis")
+        _refuse(
+            f"the outline ends in the open, at r {r:.3g} m, z {z:.3g} m; end it on a shaft or on the axis"
+        )
     return np.array(rows)
 
 

@@ -139,9 +139,7 @@ def check_setting(setting: DropSetting) -> None:
         )
     make_profile(projectile)
     if setting.geometry not in getattr(find_tip(projectile.tip), "GEOMETRIES", (setting.geometry,)):
-        refuse(
-            "projectile.tip", f"a {projectile.tip} is planar; choose another tip, or geometry planar"
-        )
+        refuse("projectile.tip", f"a {projectile.tip} is planar; choose another tip, or geometry planar")
     if setting.spacing > projectile.tip_radius / 4 * 1.0000001:
         refuse(
             "spacing",

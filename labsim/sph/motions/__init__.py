@@ -18,7 +18,9 @@ def make_path(motion: Motion) -> tuple[FloatArray, FloatArray]:
     module = find_motion(motion.kind)
     values = SHELF.read_values(motion.kind, motion.values)
     if motion.table and not getattr(module, "TAKES_TABLE", False):
-        raise SimulationError("simulation", "motion.table", f"is nothing that {motion.kind} reads; leave it out")
+        raise SimulationError(
+            "simulation", "motion.table", f"is nothing that {motion.kind} reads; leave it out"
+        )
     path = module.lead(motion.start_depth, values, motion.table)
     if path is None:
         return np.zeros(0), np.zeros(0)
@@ -27,7 +29,9 @@ def make_path(motion: Motion) -> tuple[FloatArray, FloatArray]:
         time.shape != depth.shape or time.ndim != 1 or time.size < 2 or time[0] != 0.0
         or not (np.all(np.diff(time) > 0) and np.all(np.isfinite(depth)))
     ):  # fmt: skip
-        raise SimulationError("simulation", "motion", "needs two or more times that rise from 0, and as many depths")
+        raise SimulationError(
+            "simulation", "motion", "needs two or more times that rise from 0, and as many depths"
+        )
     if depth[0] != motion.start_depth:
         raise SimulationError(
             "simulation",

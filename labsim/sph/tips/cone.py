@@ -8,7 +8,14 @@ from ..plugins import Parameter
 from ..profile import SIDE, Arc, Line, Piece, shaft
 
 PARAMETERS = (
-    Parameter("half_angle", "rad", math.radians(5), math.radians(85), math.radians(30), "cone penetration test, ISO 22476-1"),
+    Parameter(
+        "half_angle",
+        "rad",
+        math.radians(5),
+        math.radians(85),
+        math.radians(30),
+        "cone penetration test, ISO 22476-1",
+    ),
     Parameter("point_radius", "m", 0.0, 0.05, 0.0, "0: sharp"),
     Parameter("rod_radius", "m", 0.0, 0.05, 0.0, "0: the rod is as wide as the cone"),
 )
