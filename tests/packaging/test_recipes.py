@@ -14,11 +14,13 @@ import labsim.cli
 import labsim.ct.formats
 import labsim.tracks
 import labsim.video.formats
-from labsim.campaign import read_campaign
+from labsim.campaign import read_campaign, read_drop
 from labsim.ct import open_stack
 from labsim.effects import list_effects, list_places
 from labsim.records import Camera, Material, Projectile
 from labsim.sph import DropSetting, check_setting
+from labsim.sph.profile import volume_below
+from labsim.sph.tips import make_profile
 from labsim.tracks import read_rows
 from labsim.video import open_frames
 
@@ -104,6 +106,45 @@ def test_an_effect_does_what_it_expects(name: str, value: dict, campaign: Path, 
         [setting, effect.apply(setting, value, place)], store=tmp_path, workers=1
     )
     assert np.sign(changed.penetration_depth - plain.penetration_depth) == effect.expect["penetration_depth"]
+
+
+def test_a_tip_of_the_campaign(campaign: Path, tmp_path: Path) -> None:
+    """It is read with its own keys, drawn as its text says, and the dust pushes it."""
+    (campaign / "tips").mkdir()
+    (campaign / "tips" / "frustum.py").write_text(RECIPES["CAMPAIGN/tips/frustum.py"], encoding="utf-8")
+    drop = next((campaign / "drops").glob("*/drop.toml"))
+    text = drop.read_text(encoding="utf-8")
+    assert 'tip = "hemisphere"' in text
+    drop.write_text(
+        text.replace('tip = "hemisphere"', 'tip = "frustum"\nface_ratio = 0.4'), encoding="utf-8"
+    )
+    projectile = read_drop(drop).projectile
+    radius, root = projectile.tip_radius, np.sqrt(3.0)
+    assert dict(projectile.shape) == {"face_ratio": 0.4}
+    frustum = np.pi / 3 * radius**3 * root * (1 - 0.4**3)
+    profile = make_profile(projectile)
+    assert volume_below(profile, 0.6 * root * radius) == pytest.approx(frustum, rel=1e-6)
+    setting = DropSetting(projectile, 0.6, Material(p_m=2000.0), spacing=radius / 4, duration=2e-4)
+    run = labsim.simulate(setting, store=tmp_path, workers=1)
+    assert run.force.max() > 0.0 and abs(run.momentum_error) < 1e-10
+
+
+def test_a_motion_of_the_campaign(campaign: Path, tmp_path: Path) -> None:
+    """The tip stops at each pause and goes on after it."""
+    (campaign / "motions").mkdir()
+    path = campaign / "motions" / "stepwise.py"
+    path.write_text(RECIPES["CAMPAIGN/motions/stepwise.py"], encoding="utf-8")
+    drop = next((campaign / "drops").glob("*/drop.toml"))
+    keys = '\n[motion]\nkind = "stepwise"\nspeed_m_s = 0.5\nstep_mm = 0.2\ncount = 2\npause_ms = 0.4\n'
+    drop.write_text(drop.read_text(encoding="utf-8") + keys, encoding="utf-8")
+    read = read_drop(drop)
+    assert read.motion.kind == str(path)
+    setting = DropSetting(read.projectile, 0.6, Material(p_m=2000.0), spacing=read.projectile.tip_radius / 4)
+    run = labsim.simulate(setting.replace(motion=read.motion), store=tmp_path, workers=1)
+    assert run.stopped and run.penetration_depth == pytest.approx(4e-4, rel=1e-9)
+    held = (run.time > 0.45e-3) & (run.time < 0.75e-3)
+    assert np.all(run.velocity[held] == 0.0) and np.all(run.depth[held] == pytest.approx(2e-4))
+    assert abs(run.energy_error) < 0.02
 
 
 def test_a_format_of_tracks(put, tmp_path: Path) -> None:
