@@ -24,7 +24,7 @@ PRANDTL, ROUND = 2 + math.pi, 5.69  # shear strengths
 BETWEEN = (0.06, 0.10)  # tip radii of depth over which the resistance is taken
 
 
-def push_punch(geometry: str, cells: int, rigidity: float = 500.0, speed: float = 0.2, tip: str = "flat",
+def push_punch(geometry: str, cells: int, rigidity: float = 500.0, speed: float = 0.1, tip: str = "flat",
                shape: tuple[tuple[str, float], ...] = (), depth: float = BETWEEN[1], start: float = 0.0) -> DropRun:  # fmt: skip
     """Pushed to ``depth`` (in tip radii); no gravity, smooth."""
     shear = rigidity * COHESION
@@ -54,10 +54,12 @@ def read_resistance(run: DropRun, between: tuple[float, float] = BETWEEN) -> flo
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--cells", type=int, nargs="+", default=[8, 16])
     parser.add_argument("--rigidity", type=float, default=500.0)
-    parser.add_argument("--speed", type=float, default=0.2)
+    parser.add_argument("--speed", type=float, default=0.1)
     parser.add_argument("--geometry", nargs="+", default=["planar", "axisymmetric"])
     given = parser.parse_args()
     for geometry in given.geometry:
@@ -75,7 +77,18 @@ def main() -> None:
                 flush=True,
             )
             steps = np.linspace(0.01, BETWEEN[1], 10)
-            print("  ", [round(float(np.interp(s * RADIUS, run.depth, run.force) / base_area(run.setting) / COHESION), 2) for s in steps])
+            print(
+                "  ",
+                [
+                    round(
+                        float(
+                            np.interp(s * RADIUS, run.depth, run.force) / base_area(run.setting) / COHESION
+                        ),
+                        2,
+                    )
+                    for s in steps
+                ],
+            )
 
 
 if __name__ == "__main__":

@@ -72,7 +72,9 @@ def test_a_cone_is_pushed_into_clay(tmp_path: Path, capsys: pytest.CaptureFixtur
     # the same path again, from the table that the run left
     again = tmp_path / "again"
     path = ["--motion", "prescribed", "--set", f"motion.file={out / 'curve.csv'}", "--set", "motion.start_depth_mm=0.1"]  # fmt: skip
-    assert call(["simulate", "-o", str(again), "--store", str(tmp_path / "s"), *QUICK, *asked[:10], *path]) == 0
+    assert (
+        call(["simulate", "-o", str(again), "--store", str(tmp_path / "s"), *QUICK, *asked[:10], *path]) == 0
+    )
     led = read_run_file(again / "run.h5")
     assert led.depth[-1] == pytest.approx(4e-4, abs=1e-8)
     assert led.energies["driver"] == pytest.approx(run.energies["driver"], rel=0.02)
@@ -85,9 +87,9 @@ def test_keys_of_a_campaign(campaign: Path, tmp_path: Path) -> None:
     set_material(campaign, CLAY)
     read = read_campaign(campaign)
     stated = read.drops[0]
-    assert stated.projectile.tip == "cone" and dict(stated.projectile.shape)[
-        "half_angle"
-    ] == pytest.approx(0.7853981634)
+    assert stated.projectile.tip == "cone" and dict(stated.projectile.shape)["half_angle"] == pytest.approx(
+        0.7853981634
+    )
     assert stated.motion == Motion("pushed", 0.25e-3, (("speed", 0.5), ("end_depth", 1e-3)))
     assert read.drops[1].motion == Motion() and read.drops[1].projectile.shape == ()
     assert (read.calibrated, read.p_m_range) == ("cohesion", (1e3, 4e3))

@@ -115,9 +115,7 @@ def test_a_tip_of_the_campaign(campaign: Path, tmp_path: Path) -> None:
     drop = next((campaign / "drops").glob("*/drop.toml"))
     text = drop.read_text(encoding="utf-8")
     assert 'tip = "hemisphere"' in text
-    drop.write_text(
-        text.replace('tip = "hemisphere"', 'tip = "frustum"\nface_ratio = 0.4'), encoding="utf-8"
-    )
+    drop.write_text(text.replace('tip = "hemisphere"', 'tip = "frustum"\nface_ratio = 0.4'), encoding="utf-8")
     projectile = read_drop(drop).projectile
     radius, root = projectile.tip_radius, np.sqrt(3.0)
     assert dict(projectile.shape) == {"face_ratio": 0.4}
