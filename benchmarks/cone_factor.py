@@ -13,6 +13,7 @@ import argparse
 import math
 
 from flat_punch import COHESION, RADIUS, read_resistance
+
 from labsim.records import Material, Motion, Projectile
 from labsim.sph import DropRun, DropSetting, simulate
 
@@ -57,7 +58,8 @@ def main() -> None:
             found = [read_resistance(run, (at, at + 1.0)) for at in (5.0, 6.0, 7.0, 8.0)]
             print(
                 f"  R/dx {cells}: {', '.join(f'{each:.2f}' for each in found)} over the tip radii 5 to 9; energy "
-                f"{run.energy_error:+.1%}, contact {run.energy_share('contact'):+.1%}, viscosity {run.viscous_share:.1%}, {run.wall:.0f} s",
+                f"{run.energy_error:+.1%}, contact {run.energy_share('contact'):+.1%}, viscosity {run.viscous_share:.1%}, "
+                f"{run.wall:.0f} s",
                 flush=True,
             )
 

@@ -20,7 +20,8 @@ Values = tuple[tuple[str, float], ...]
 
 
 def read_tip(table: Table, known: tuple[str, ...], beside: Path | None = None) -> tuple[str, Values]:
-    """``tip`` and the tip's own numbers. known : the keys of every projectile; beside : a campaign, whose ``tips/`` may hold it."""
+    """``tip`` and the tip's own numbers. known : the keys of every projectile; beside : a campaign that may
+    hold it in ``tips/``."""
     name = table.text("tip")
     if name in ROUND and set(table.values) <= {"tip", *known}:
         return name, ()
@@ -57,7 +58,7 @@ def read_motion(table: Table, beside: Path | None = None, folder: Path = Path())
 
 
 def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, tuple[float, float]]:
-    """Material of a law that is not the dust's, the parameter that is calibrated, and its range (SI); the middle of it is in force."""
+    """Material of a law that is not the dust's, the parameter that is calibrated, and its range (SI), whose middle is in force."""
     from .sph.materials import find_law
     from .sph.plugins import key_of
 
@@ -106,11 +107,12 @@ def find_name(table: Table, key: str, name: str, folder: str, beside: Path | Non
     CampaignError where there is none or it cannot be loaded."""
     from .sph import materials, motions, tips
 
-    there, find = {
+    shelves: dict[str, tuple[Any, Any]] = {
         "tips": (tips.list_tips, tips.find_tip),
         "motions": (motions.list_motions, motions.find_motion),
         "materials": (materials.list_laws, materials.find_law),
-    }[folder]
+    }
+    there, find = shelves[folder]
     own = beside / folder / f"{name}.py" if beside is not None else None
     if own is not None and own.is_file():
         name = str(own)

@@ -186,5 +186,6 @@ def _say_push(run: DropRun, summary: dict) -> str:
     summary["force_max_N"] = float(run.force.max())
     return (
         f"{say_projectile(run.setting)}, {say_motion(run.setting)}: {last:.4g} {unit} over the last fifth of a tip radius, "
-        f"{last / area / 1e3:.4g} kPa of its section; largest {run.force.max():.4g} {unit}; work of the driver {run.energies['driver']:.4g} J"
+        f"{last / area / 1e3:.4g} kPa of its section; largest {run.force.max():.4g} {unit}; "
+        f"work of the driver {run.energies['driver']:.4g} J"
     )

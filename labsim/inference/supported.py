@@ -24,6 +24,6 @@ def refuse_others(campaign: Campaign) -> None:
             raise InferenceError(
                 campaign.folder / "drops" / drop.name / "drop.toml",
                 "motion.kind",
-                f'"{Path(drop.motion.kind).stem}" from {drop.motion.start_depth * 1e3:g} mm is not compared with a record, only a '
+                f'"{Path(drop.motion.kind).stem}" is not compared with a record, only a '
                 f"drop from above the surface is; {INSTEAD}, or take it out of the campaign",
             )

@@ -22,7 +22,8 @@ ONE_FILE_EACH = ("materials", "tips", "motions")
 
 
 def hash_sources() -> str:
-    """Hash of every source of the solver but the laws', tips' and motions', and the version of the compiler: changes when any result could change."""
+    """Hash of every source of the solver but the laws', tips' and motions', and the version of the compiler: changes when any
+    result could change."""
     digest = hashlib.sha256(numba.__version__.encode())
     for path in sorted(_SOURCES.rglob("*.py")):
         if path.parent.name in ONE_FILE_EACH and not path.name.startswith("_"):

@@ -17,8 +17,8 @@ from ..records import FloatArray
 from ._jit import compiled, compiled_entry
 
 SIDE = math.pi / 2  # heading of a shaft
-# columns: centre of an arc or begin of a line; radius; first and last normal, anticlockwise; length of a line; 1 for an arc, -1 for
-# a hollow one, 0 for a line
+# columns: centre of an arc or begin of a line; radius; first and last normal, anticlockwise; length of a line; 1 for an arc,
+# -1 for a hollow one, 0 for a line
 R, Z, RADIUS, FIRST_R, FIRST_Z, LAST_R, LAST_Z, LENGTH, BENT = range(9)
 
 

@@ -78,7 +78,8 @@ class DropRun:
         return half * by_r, half * by_z
 
     def energy_share(self, sink: str) -> float:
-        """What went into ``sink``, a name in ``energies``, of the kinetic energy at contact and what gravity and a driver gave."""
+        """What went into ``sink``, a name in ``energies``, of the kinetic energy at contact and of what gravity and a driver
+        gave."""
         given = (
             self.energies["kinetic_at_contact"] + self.energies["gravity"] + self.energies.get("driver", 0.0)
         )

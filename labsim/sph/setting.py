@@ -59,7 +59,7 @@ class DropSetting:
     width: float | None = None  # m, half width in r-z, full width in the plane; None: enough for this drop
     depth: float | None = None  # m, of the dust; None: enough for this drop
     numerics: Numerics = field(default_factory=Numerics)
-    motion: Motion = Motion()
+    motion: Motion = field(default_factory=Motion)
 
     strength_rate: float = 0.0  # s^n, Σ (1 + strength_rate ε̇^n)
     strength_rate_exponent: float = 0.5
@@ -84,12 +84,12 @@ class DropSetting:
 
     @property
     def expected_depth(self) -> float:
-        """Depth (m) that the tip may reach: a driver's path says it, and for a drop a little less than D = 8e-4 m v / A, in m, kg and s (Güttler et al. 2009), for dust
-        of 1300 Pa or more, deeper in softer dust with the third root of its strength. It only sizes boxes."""
+        """Depth (m) that the tip may reach. A driver's path says it; for a drop a little less than D = 8e-4 m v / A, in m, kg
+        and s (Güttler et al. 2009), for dust of 1300 Pa or more, deeper in softer dust with the third root of its strength. It
+        only sizes boxes."""
         _, led = self.path
         if led.size:
             return float(led.max())
-        radius = self.projectile.tip_radius
         area = base_area(self)
         strength = max(find_law(self.material.law).resistance(self), 1.0)
         # softer dust lets it through to where the bottom would be felt

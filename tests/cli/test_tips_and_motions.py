@@ -71,7 +71,8 @@ def test_a_cone_is_pushed_into_clay(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert (out / "run.png").stat().st_size > 10_000 and (out / "field.png").stat().st_size > 10_000
     # the same path again, from the table that the run left
     again = tmp_path / "again"
-    path = ["--motion", "prescribed", "--set", f"motion.file={out / 'curve.csv'}", "--set", "motion.start_depth_mm=0.1"]  # fmt: skip
+    file = f"motion.file={out / 'curve.csv'}"
+    path = ["--motion", "prescribed", "--set", file, "--set", "motion.start_depth_mm=0.1"]
     assert (
         call(["simulate", "-o", str(again), "--store", str(tmp_path / "s"), *QUICK, *asked[:10], *path]) == 0
     )

@@ -117,7 +117,12 @@ def test_two_motions_do_not_share_their_runs():
         return make_key(a_push(motion=Motion(kind, start, values), **changes))
 
     usual = key(("speed", 0.3))
-    others = [key(("speed", 0.2)), key(("speed", 0.3), ("end_depth", 1e-3)), key(("speed", 0.3), start=1e-3), key(kind="free")]  # fmt: skip
+    others = [
+        key(("speed", 0.2)),
+        key(("speed", 0.3), ("end_depth", 1e-3)),
+        key(("speed", 0.3), start=1e-3),
+        key(kind="free"),
+    ]
     assert len({usual, *others}) == 5
     assert usual == key(("speed", 0.3), ("end_depth", 2e-3))  # its default, written out
     assert usual == key(("speed", 0.3), impact_speed=0.5)  # a led projectile has the speed of its path

@@ -1,4 +1,4 @@
-"""One file a motion, found by listing this folder; a file of the same kind may lie anywhere else (docs/extend.md has the recipe)."""
+"""One file a motion, found by listing this folder; a file of the same kind may lie anywhere else: docs/extend.md."""
 
 from __future__ import annotations
 

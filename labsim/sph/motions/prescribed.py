@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ...errors import SimulationError
-from ...records import FloatArray
 from ..plugins import Parameter
 
 PARAMETERS: tuple[Parameter, ...] = ()
@@ -12,7 +11,7 @@ TAKES_TABLE = True
 
 def lead(
     start_depth: float, values: dict[str, float], table: tuple[tuple[float, float], ...]
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if len(table) < 2:
         raise SimulationError("simulation", "motion.table", "needs two or more (time s, depth m)")
     time, depth = zip(*table, strict=True)
