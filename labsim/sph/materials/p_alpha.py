@@ -108,11 +108,10 @@ def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
             "material.crush_end",
             f"is {law.crush_end:g} Pa; use more than crush_start, less than filling_factor solid_modulus / 2",
         )
-    distension = np.linspace(1.0, 1 + max(law.excess, 0.0), 1000)
+    distension = np.linspace(1.0, law.start, 1000)
     h = 1 - law.gain * (distension - 1)
-    curve = law.crush_end - (law.crush_end - law.crush_start) * np.sqrt(
-        (distension - 1) / max(law.excess, 1e-300)
-    )
+    x = np.sqrt(np.minimum((distension - 1) / max(law.excess, 1e-300), 1.0))
+    curve = law.crush_end - x * (law.crush_end - law.crush_start)
     if law.excess <= 0.0 or np.any(2 * law.gain * distension**2 * curve >= 0.9 * law.solid_modulus * h**3):
         refuse(
             "material.elastic_speed",
