@@ -58,7 +58,7 @@ def read_motion(table: Table, beside: Path | None = None, folder: Path = Path())
 
 
 def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, tuple[float, float]]:
-    """Material of a law that is not the dust's, the parameter that is calibrated, and its range (SI), whose middle is in force."""
+    """Material of a law that is not the dust's, what of it is calibrated, and its range (SI), whose middle is in force."""
     from .sph.materials import find_law
     from .sph.plugins import key_of
 
@@ -66,7 +66,7 @@ def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, t
     module = find_law(law)
     what = f'law = "{Path(law).stem}"'
     by_name = {each.name: each for each in module.PARAMETERS}
-    first = by_name[module.CALIBRATED]
+    first = by_name[module.CALIBRATED.name]
     ending, unit = key_of(first)[0].removeprefix(first.name), key_of(first)[1]
     low, high = read_range(table, f"{first.name}_range{ending}", first.low / unit, first.high / unit)
     friction = table.number("contact_friction", 0.0, 5.0, default=0.0)

@@ -96,7 +96,8 @@ def warn_of_grey(grey: GreyCheck, surface: Surface, bead: Bead, scan: Scan, leve
         warnings.append(f"{grey.saturated:.2%} of the voxels outside the bead sit at the top of the range")
     if bead.saturated:
         warnings.append(
-            "the bead is saturated: its density cannot be read, so its mass_mg is not checked from above; a wider window of grey levels at export would show it"
+            "the bead is saturated: its density cannot be read, so its mass_mg is not checked from above; "
+            "a wider window of grey levels at export would show it"
         )
     if abs(grey.filling_factor_air) > 0.003:
         warnings.append(

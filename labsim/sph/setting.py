@@ -147,7 +147,7 @@ def check_setting(setting: DropSetting) -> None:
             f"use {projectile.tip_radius / 4:.3g} m or less",
         )
     start = setting.motion.start_depth
-    if not 0.0 <= start < setting.extent[1] - 3 * projectile.tip_radius:
+    if start and not 0.0 < start < setting.extent[1] - 3 * projectile.tip_radius:
         refuse(
             "motion.start_depth",
             f"is {start:g} m; at least three tip radii of the {setting.extent[1]:g} m of dust must lie below the tip",
