@@ -28,6 +28,7 @@ from ..records import (
     Sample,
     Scan,
 )
+from ..sph.materials import list_numbers
 from .contract import KINDS, OBSERVABLES, Effect, Parameter
 from .priors import HalfNormal, LogNormal, Normal, Uniform
 
@@ -193,8 +194,15 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
             file, "change_setting", "is missing, and so is change_instrument; write at least one of them"
         )
     applies = _function(file, module, "applies", 1) or (lambda campaign: "")
+    needs = getattr(module, "needs", ())
+    if not isinstance(needs, tuple) or not all(isinstance(each, str) for each in needs):
+        raise EffectError(file, "needs", f'{needs!r} is not a tuple of names; write needs = ("delta",)')
 
     def reason_against(campaign: Campaign) -> str:
+        law = campaign.material.law
+        missing = [name for name in needs if name not in list_numbers(law)]
+        if missing:
+            return f"the law {Path(law).stem} has no {' and no '.join(missing)}"
         reason = applies(campaign)
         if not isinstance(reason, str):
             raise EffectError(file, "applies", f'returned {reason!r}; return "" or the reason why not')

@@ -29,7 +29,9 @@ from labsim.effects import (
 from labsim.effects.loading import list_own_files
 from labsim.errors import EffectError
 from labsim.inference.grid import set_nominal_drop
+from labsim.records import Material
 from labsim.sph import DropSetting
+from labsim.sph.materials import list_laws
 
 DATA = Path(__file__).parents[2] / "data" / "guettler2009"
 
@@ -277,3 +279,26 @@ def test_effects_of_the_catalogue_are_not_announced(caplog: pytest.LogCaptureFix
     loading._loaded.clear()
     list_effects()
     assert not caplog.records
+
+
+@pytest.mark.parametrize("law", list_laws())
+def test_effects_attach_where_the_law_has_what_they_change(law):
+    """A rate goes with every strength, the slope of Σ with the dust's alone; whatever does not attach says what is missing."""
+    campaign = reference_campaign()
+    campaign = dataclasses.replace(campaign, material=Material(law=law))
+    against = {name: effect.applies(campaign) for name, effect in list_effects().items()}
+    assert against["strength_rate"] == "" and against["pixel_scale"] == ""
+    if law == "porous_dust":
+        assert not any("has no" in reason for reason in against.values())
+    else:
+        assert against["strength_slope"] == f"the law {law} has no delta"
+        assert against["pore_gas"] == f"the law {law} has no pore_gas"
+        assert against["surface_crust"].startswith(f"the law {law} has no ")
+
+
+def test_needs_that_are_no_names(tmp_path):
+    file = tmp_path / "wrong.py"
+    source = (CATALOGUE / "strength_slope.py").read_text()
+    file.write_text(source.replace('needs = ("delta",)', 'needs = "delta"'))
+    with pytest.raises(EffectError, match="needs"):
+        load_file(file)

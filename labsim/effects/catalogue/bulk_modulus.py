@@ -4,6 +4,7 @@ from labsim.effects import LogNormal, Parameter, list_thrown
 
 title = "The bulk modulus differs"
 kind = "material"
+needs = ("bulk_modulus", "shear_to_bulk")
 
 
 def parameters(campaign):

@@ -5,6 +5,7 @@ from labsim.sph.setting import LEAST_GRADED, LOOSEST
 
 title = "The filling factor changes with depth"
 kind = "sample"
+needs = ("filling_gradient", "phi_1")
 
 
 def parameters(campaign):

@@ -4,6 +4,7 @@ from labsim.effects import Normal, Parameter
 
 title = "The sample is denser or looser than stated"
 kind = "sample"
+needs = ("phi_1",)
 
 
 def parameters(campaign):

@@ -7,6 +7,7 @@ from labsim.effects import HalfNormal, Parameter
 
 title = "Gas trapped in the pores pushes back"
 kind = "material"
+needs = ("pore_gas",)
 parameters = (
     Parameter(
         "P0",

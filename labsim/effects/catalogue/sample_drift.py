@@ -7,6 +7,7 @@ from labsim.effects import Normal, Parameter
 
 title = "The strength drifts from drop to drop"
 kind = "sample"
+needs = ("p_m",)
 parameters = (
     Parameter(
         "relative_change",

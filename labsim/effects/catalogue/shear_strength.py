@@ -4,6 +4,7 @@ from labsim.effects import LogNormal, Parameter
 
 title = "The shear strength is a multiple of √(Σ|T|)"
 kind = "material"
+needs = ("shear_factor",)
 
 
 def parameters(campaign):

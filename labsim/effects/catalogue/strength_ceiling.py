@@ -4,6 +4,7 @@ from labsim.effects import Normal, Parameter
 
 title = "The filling factor where the strength diverges differs"
 kind = "material"
+needs = ("phi_2",)
 
 
 def parameters(campaign):

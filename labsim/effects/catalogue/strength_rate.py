@@ -7,6 +7,7 @@ from labsim.effects import HalfNormal, Normal, Parameter
 
 title = "The strength grows with the rate of compression"
 kind = "material"
+needs = ("strength_rate",)
 parameters = (
     Parameter(
         "eta",

@@ -4,6 +4,7 @@ from labsim.effects import Normal, Parameter
 
 title = "The slope of the strength differs"
 kind = "material"
+needs = ("delta",)
 
 
 def parameters(campaign):

@@ -4,6 +4,7 @@ from labsim.effects import LogNormal, Normal, Parameter
 
 title = "The top of the sample is denser or fluffier than the bulk"
 kind = "sample"
+needs = ("crust_excess", "phi_1")
 
 
 def parameters(campaign):

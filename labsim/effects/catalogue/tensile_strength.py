@@ -6,6 +6,7 @@ from labsim.effects import LogNormal, Parameter
 
 title = "The tensile strength differs by a factor"
 kind = "material"
+needs = ("tensile_log10_a",)
 parameters = (
     Parameter(
         "factor",

@@ -51,6 +51,12 @@ def is_current(solver: str) -> bool:
     return name == SOLVER_HASH[:10] and (law not in list_laws() or solver == solver_hash(law))
 
 
+def list_numbers(law: str) -> set[str]:
+    """What an effect may change of a law: its parameters, and the terms of a setting that it takes."""
+    module = find_law(law)
+    return {each.name for each in module.PARAMETERS} | set(getattr(module, "TERMS", ()))
+
+
 @functools.cache
 def find_law(law: str) -> ModuleType:
     """The module of a law. A file from elsewhere is loaded under the hash of its content, so an edited one is another law."""

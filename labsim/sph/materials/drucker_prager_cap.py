@@ -49,6 +49,7 @@ PARAMETERS = (
     *parts.RATE,
 )
 CALIBRATED = parts.Calibrated("friction_angle", 20.0, 50.0)
+TERMS = ("strength_rate", "crust_excess", "filling_gradient")  # of a setting that it takes
 
 
 class State(NamedTuple):
@@ -107,7 +108,7 @@ def resistance(setting: DropSetting) -> float:
 
 def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
     law = make_constants(setting)
-    parts.refuse_terms(setting, ("strength_rate", "crust_excess", "filling_gradient"))
+    parts.refuse_terms(setting, TERMS)
     if law.dilatancy > law.slope:
         refuse("material.dilatancy_angle", "is above friction_angle: shear would create energy; lower it")
 

@@ -41,6 +41,7 @@ PARAMETERS = (
     *parts.RATE,
 )
 CALIBRATED = parts.Calibrated("crush_end", 1e4, 1e7)
+TERMS = ("strength_rate", "crust_excess", "filling_gradient")  # of a setting that it takes
 
 
 class State(NamedTuple):
@@ -99,7 +100,7 @@ def resistance(setting: DropSetting) -> float:
 
 def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
     law = make_constants(setting)
-    parts.refuse_terms(setting, ("strength_rate", "crust_excess", "filling_gradient"))
+    parts.refuse_terms(setting, TERMS)
     phi = setting.filling_factor
     if not phi < 1.0:
         refuse("filling_factor", f"is {phi!r}; a porous solid is below 1")

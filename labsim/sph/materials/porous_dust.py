@@ -55,6 +55,13 @@ PARAMETERS = (  # those of the rate are in Material.constants, all others fields
     *RATE,
 )
 CALIBRATED = Calibrated("p_m", 300.0, 6000.0)
+TERMS = (
+    "strength_rate",
+    "pore_gas",
+    "strength_shape",
+    "crust_excess",
+    "filling_gradient",
+)  # of a setting that it takes
 REFERENCE_FILLING_FACTOR = 0.15  # where bulk_modulus is stated
 EDGE = 0.002  # distance in φ from the poles of Σ at which the table leaves the formula
 TABLE_SIZE = 8193

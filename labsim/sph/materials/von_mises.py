@@ -31,6 +31,7 @@ PARAMETERS = (
     *parts.RATE,
 )
 CALIBRATED = parts.Calibrated("cohesion", 1e2, 1e6)
+TERMS = ("strength_rate",)  # of a setting that it takes
 
 
 class State(NamedTuple):
@@ -69,7 +70,7 @@ def resistance(setting: DropSetting) -> float:
 
 def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
     make_constants(setting)
-    parts.refuse_terms(setting, ("strength_rate",))
+    parts.refuse_terms(setting, TERMS)
 
 
 def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
