@@ -134,20 +134,22 @@ def find_surface(x, z, tip, profile):
     for k in range(profile.shape[0]):
         a = across - profile[k, 0]
         b = z - (tip + profile[k, 1])
-        bent = profile[k, 8]
-        if bent == 0.0:
+        if profile[k, 8] == 0.0:
             along = b * profile[k, 3] - a * profile[k, 4]
             d = a * profile[k, 3] + b * profile[k, 4]
             if along >= 0.0 and along <= profile[k, 7] and abs(d) < abs(best):
                 best, normal_x, normal_z = d, profile[k, 3], profile[k, 4]
-            continue
-        a *= bent
-        b *= bent
-        if profile[k, 3] * b >= profile[k, 4] * a and a * profile[k, 6] >= b * profile[k, 5]:
+        elif profile[k, 8] > 0.0:
+            if profile[k, 3] * b >= profile[k, 4] * a and a * profile[k, 6] >= b * profile[k, 5]:
+                length = math.sqrt(a * a + b * b)
+                d = length - profile[k, 2]
+                if length > 0.0 and abs(d) < abs(best):
+                    best, normal_x, normal_z = d, a / length, b / length
+        elif profile[k, 3] * b <= profile[k, 4] * a and a * profile[k, 6] <= b * profile[k, 5]:
             length = math.sqrt(a * a + b * b)
-            d = bent * (length - profile[k, 2])
+            d = profile[k, 2] - length
             if length > 0.0 and abs(d) < abs(best):
-                best, normal_x, normal_z = d, a / length, b / length
+                best, normal_x, normal_z = d, -a / length, -b / length
     return best, (normal_x if x > 0.0 else -normal_x), normal_z
 
 
