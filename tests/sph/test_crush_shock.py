@@ -1,7 +1,7 @@
 """Hugoniot of a crushed solid (P-alpha): an elastic precursor at crush_start, and a shock on the crush curve behind it.
 
-The law is isothermal, so the Hugoniot is the crush curve: u - u_e = √((p - p_e)(1/ρ_e - 1/ρ)) across the second front. Both
-fronts are shocks (p is straight in ρ before crush_start, so convex in 1/ρ).
+The law is isothermal, so the Hugoniot is the crush curve: u - u_e = √((p - p_e)(1/ρ_e - 1/ρ)) across the second front.
+Both fronts are shocks (p is straight in ρ before crush_start, so convex in 1/ρ).
 """
 
 import math
@@ -104,7 +104,7 @@ def test_both_fronts(geometry, piston):
     print(
         f"{geometry}, {piston} m/s: φ {phi:.4f} {off[0]:+.2f} %, p {p:.0f} Pa {off[1]:+.2f} %, "
         f"front {front:.2f} m/s {off[2]:+.2f} %, precursor {precursor:.2f} m/s {off[3]:+.2f} %, "
-        f"{100 * plateau:+.2f} % of crush_start"
+        f"{100 * plateau:+.2f} % of crush_start between"
     )
     assert np.all(np.abs(off) < (1.5, 4.0, 1.5, 1.5))
     assert abs(plateau) < 0.02
