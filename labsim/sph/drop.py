@@ -203,7 +203,7 @@ def start_body(setting: DropSetting) -> FloatArray:
     """The projectile at the start, as ``evolve`` takes it."""
     time, led = setting.path
     speed = (led[1] - led[0]) / time[1] if led.size else setting.impact_speed
-    return np.array([-setting.motion.start_depth, -speed, 0.0, 0.0, 0.0])
+    return np.array([0.0 - setting.motion.start_depth, -speed, 0.0, 0.0, 0.0])
 
 
 def _blown_up(setting: DropSetting, steps: int, reached: float) -> SimulationError:
