@@ -1,7 +1,7 @@
 """Expansion of a cavity, driven through the laws' own updates on one radius of particles, against limit pressures.
 
-Incompressible matter: the motion is known, r³ = R³ + a³ - a0³, so are all strains; the pressure on the wall is the integral of
-equilibrium. Else a cavity that grows from nothing has a similarity solution, an ordinary differential equation:
+Incompressible matter: the motion is known, r³ = R³ + a³ - a0³, so are all strains; the pressure on the wall is the
+integral of equilibrium. Else a cavity that grows from nothing has a similarity solution, an ordinary differential equation:
 a particle led along it has to end at its limit pressure.
 """
 
@@ -114,7 +114,7 @@ def solve_similarity(m, flow, k, bulk, shear, p0):
 
 
 def follow(material, p0, yielding, near, field, steps):
-    """Radial pressure of one particle that the cavity comes ``near`` to, strained as the similarity solution says, by the law itself."""
+    """Radial pressure of one particle that the cavity comes ``near`` to, strained as the similarity solution says."""
     particle = Radius(material, 1, True, p0)
     for _ in range(100):
         particle.strain(-2 * yielding / 100, yielding / 100)
@@ -165,6 +165,7 @@ def test_limit_pressure_of_a_cavity_from_nothing(case):
     found = follow(material, p0, (k + m * p0) / (6 * shear), NEAR * wall, field, 4000)
     exact = radial(NEAR * wall)
     print(
-        f"{case}: limit {radial(wall):.0f} Pa, at {NEAR:g} radii {exact:.0f} Pa, {found / exact - 1:+.2%}; yielded to {1 / wall:.2f} radii of the cavity"
+        f"{case}: limit {radial(wall):.0f} Pa, at {NEAR:g} radii {exact:.0f} Pa, {found / exact - 1:+.2%}; "
+        f"yielded to {1 / wall:.2f} radii of the cavity"
     )
     assert found == pytest.approx(exact, rel=0.005)

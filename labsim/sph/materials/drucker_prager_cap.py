@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 PARAMETERS = (
     parts.Parameter("friction_angle", "°", 0.0, 60.0, 35.0, "dry sand of medium density: 33 to 38°"),
-    parts.Parameter("dilatancy_angle", "°", 0.0, 60.0, 5.0, "friction less 30°, Bolton (1986)"),
+    parts.Parameter("dilatancy_angle", "°", 0.0, 60.0, 5.0, "about friction less the critical angle, Bolton (1986)"),
     parts.Parameter(
         "cohesion", "Pa", 0.0, 1e9, 0.0, "dry sand; lunar regolith 100 to 1000, Carrier et al. (1991)"
     ),
