@@ -18,7 +18,10 @@ from labsim.campaign import read_campaign, read_drop
 from labsim.ct import open_stack
 from labsim.effects import list_effects, list_places
 from labsim.records import Camera, Material, Projectile
-from labsim.sph import DropSetting, check_setting
+from labsim.sph import DropSetting, check_setting, simulate
+from labsim.sph.bodies import set_body
+from labsim.sph.materials import find_law
+from labsim.sph.particles import fill_at_rest, name_rows
 from labsim.sph.profile import volume_below
 from labsim.sph.tips import make_profile
 from labsim.tracks import read_rows
@@ -143,6 +146,30 @@ def test_a_motion_of_the_campaign(campaign: Path, tmp_path: Path) -> None:
     held = (run.time > 0.45e-3) & (run.time < 0.75e-3)
     assert np.all(run.velocity[held] == 0.0) and np.all(run.depth[held] == pytest.approx(2e-4))
     assert abs(run.energy_error) < 0.02
+
+
+def test_a_law(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Sheared along ξ its strength is the formula's; a drop balances its energy; the command lists it."""
+    path = tmp_path / "sensitive_clay.py"
+    path.write_text(RECIPES["CAMPAIGN/materials/sensitive_clay.py"], encoding="utf-8")
+    assert len(path.read_text().splitlines()) <= 60
+    material = Material(law=str(path), constants=(("strain_95", 1.0), ("shear_modulus", 5e6)))
+    setting = set_body(material, 1e-4, 1.0, geometry="axisymmetric", filling_factor=0.5)
+    s, own = name_rows(setting, fill_at_rest(setting, np.ones(1), np.zeros(1), np.array([0.5])))
+    law = find_law(str(path))
+    s.lxz[:] = 0.5
+    for _ in range(4000):
+        law.update(0, 1, 2.5e-4, True, s, own, law.make_constants(setting), law.make_tables(setting))
+    xi = 0.5 / np.sqrt(3)
+    strength = 2 * 5e3 * (1 / 3 + 2 / 3 * np.exp(-3 * xi))
+    assert own.sheared[0] == pytest.approx(xi, rel=0.01)
+    assert np.sqrt(3) * np.hypot(s.sxz[0], s.sxx[0]) == pytest.approx(strength, rel=0.01)
+    ball = Projectile("sphere", 5e-4, 5e-7)
+    run = simulate(DropSetting(ball, 1.0, Material(law=str(path)), filling_factor=0.5, spacing=6.25e-5))
+    assert run.stopped and abs(run.energy_error) < 0.01
+    with pytest.raises(SystemExit):
+        labsim.cli.main(["materials", str(path), "--json"])
+    assert json.loads(capsys.readouterr().out)["laws"][0]["name"] == "sensitive_clay"
 
 
 def test_a_format_of_tracks(put, tmp_path: Path) -> None:

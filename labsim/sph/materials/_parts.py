@@ -14,6 +14,8 @@ from .._jit import compiled
 from . import find_law
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..setting import DropSetting
     from ..state import Rows
 
@@ -114,6 +116,19 @@ def refuse_terms(setting: DropSetting, allowed: tuple[str, ...] = ()) -> None:
             )
 
 
+def make_constants(setting: DropSetting) -> Any:
+    """Of a law whose Constants are its PARAMETERS, in their order, RATE as one."""
+    law = find_law(setting.material.law)
+    return law.Constants(*read_parameters(setting, law.PARAMETERS))
+
+
+def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
+    """Of a law with no more limits than those of its PARAMETERS and TERMS."""
+    law = find_law(setting.material.law)
+    law.make_constants(setting)
+    refuse_terms(setting, getattr(law, "TERMS", ()))
+
+
 class Tables(NamedTuple):
     """Of a law that looks nothing up."""
 
@@ -139,6 +154,18 @@ def sound_speed(setting: DropSetting) -> float:
 def find_warnings(setting: DropSetting, s: Rows, own: Any) -> list[str]:
     """Of a law that has nothing to say at the stop."""
     return []
+
+
+def find_shape_energy(s: Rows, shear_modulus: float) -> FloatArray:
+    """Elastic energy of the deviatoric stress per mass, J/kg."""
+    squared = s.sxx**2 + s.szz**2 + (s.sxx + s.szz) ** 2 + 2.0 * s.sxz**2
+    return np.asarray(squared / (4.0 * shear_modulus * s.density))
+
+
+def find_volume_energy(s: Rows, reference: FloatArray, bulk_modulus: FloatArray | float) -> FloatArray:
+    """Elastic energy per mass, J/kg, of p = bulk_modulus (ρ/reference - 1)."""
+    ratio = s.density / reference
+    return np.asarray(bulk_modulus / reference * (np.log(ratio) + 1.0 / ratio - 1.0))
 
 
 @compiled

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 PARAMETERS = (
     parts.Parameter("friction_angle", "°", 0.0, 60.0, 35.0, "dry sand of medium density: 33 to 38°"),
-    parts.Parameter("dilatancy_angle", "°", 0.0, 60.0, 5.0, "about friction less the critical angle, Bolton (1986)"),
+    parts.Parameter(
+        "dilatancy_angle", "°", 0.0, 60.0, 5.0, "about friction less the critical angle, Bolton (1986)"
+    ),
     parts.Parameter(
         "cohesion", "Pa", 0.0, 1e9, 0.0, "dry sand; lunar regolith 100 to 1000, Carrier et al. (1991)"
     ),
@@ -117,8 +119,8 @@ def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
     """Per mass, J/kg."""
     law = make_constants(setting)
     strain = s.pressure / law.bulk_modulus
-    shape = s.sxx**2 + s.szz**2 + (s.sxx + s.szz) ** 2 + 2.0 * s.sxz**2
-    return (law.bulk_modulus * (np.expm1(strain) - strain) + shape / (4.0 * law.shear_modulus)) / s.density
+    volume = law.bulk_modulus * (np.expm1(strain) - strain) / s.density
+    return volume + parts.find_shape_energy(s, law.shear_modulus)
 
 
 @compiled

@@ -124,10 +124,9 @@ def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
     """Per mass, J/kg."""
     law = make_constants(setting)
     h = np.maximum(law.elastic_speed, 1 - law.gain * (own.distension - 1))
-    ratio = s.density / law.solid_density * own.distension
-    shape = s.sxx**2 + s.szz**2 + (s.sxx + s.szz) ** 2 + 2.0 * s.sxz**2
-    volume = law.solid_modulus * h**2 / law.solid_density * (np.log(ratio) + 1.0 / ratio - 1.0)
-    return volume + shape / (4.0 * law.shear_modulus * s.density)
+    zero = law.solid_density / own.distension
+    volume = parts.find_volume_energy(s, zero, law.solid_modulus * h**2 / own.distension)
+    return volume + parts.find_shape_energy(s, law.shear_modulus)
 
 
 @compiled

@@ -18,8 +18,6 @@ from labsim.sph._jit import compiled
 from labsim.sph.materials import _parts as parts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from labsim.sph.setting import DropSetting
     from labsim.sph.state import Rows
 
@@ -46,14 +44,12 @@ class Constants(NamedTuple):
     rate: parts.Rate
 
 
+make_constants = parts.make_constants
 make_tables = parts.make_tables  # nothing is looked up
+check = parts.check
 sound_speed = parts.sound_speed
 find_warnings = parts.find_warnings  # none
 bearable_pressure = parts.bearable_pressure  # any
-
-
-def make_constants(setting: DropSetting) -> Constants:
-    return Constants(*parts.read_parameters(setting, PARAMETERS))
 
 
 def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -> tuple[State, FloatArray]:
@@ -65,21 +61,14 @@ def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -
 
 
 def resistance(setting: DropSetting) -> float:
-    return 8.0 * make_constants(setting).cohesion  # about what a deep tip meets
-
-
-def check(setting: DropSetting, refuse: Callable[[str, str], None]) -> None:
-    make_constants(setting)
-    parts.refuse_terms(setting, TERMS)
+    return float(8.0 * make_constants(setting).cohesion)  # about what a deep tip meets
 
 
 def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
     """Per mass, J/kg."""
     law = make_constants(setting)
-    ratio = s.density / own.reference
-    shape = s.sxx**2 + s.szz**2 + (s.sxx + s.szz) ** 2 + 2.0 * s.sxz**2
-    volume = law.bulk_modulus / own.reference * (np.log(ratio) + 1.0 / ratio - 1.0)
-    return volume + shape / (4.0 * law.shear_modulus * s.density)
+    volume = parts.find_volume_energy(s, own.reference, law.bulk_modulus)
+    return volume + parts.find_shape_energy(s, law.shear_modulus)
 
 
 @compiled
