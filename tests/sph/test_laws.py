@@ -98,6 +98,24 @@ def test_a_ball_on_clay(clay):
     assert clay.solver == solver_hash("von_mises") != solver_hash()
 
 
+@pytest.mark.parametrize(
+    ("law", "constants", "phi"),
+    [
+        ("drucker_prager_cap", (("cohesion", 50.0), ("cap_pressure", 1e5)), 0.6),
+        ("p_alpha", (("tension", 1e3),), 0.2),
+    ],
+)
+def test_a_ball_on_other_matter(law, constants, phi):
+    """It stops, momentum is kept and the books balance; the effect on rates is the law's too."""
+    setting = a_drop().replace(material=Material(law=law, constants=constants), filling_factor=phi)
+    run = simulate(setting)
+    print(f"{law}: D {run.penetration_depth * 1e3:.4f} mm, energy {run.energy_error:+.2%}")
+    assert run.stopped and run.penetration_depth > 0 and not run.warnings
+    assert abs(run.energy_error) < 0.01 and abs(run.momentum_error) < 1e-12
+    assert run.energies["plastic"] > 0.5 * run.energies["kinetic_at_contact"]
+    check_setting(setting.replace(strength_rate=0.1))
+
+
 def test_a_law_from_elsewhere_is_the_same_law(clay, tmp_path):
     """The same text in another folder, in another process: same numbers, and the next one compiles nothing."""
     path = tmp_path / "von_mises.py"

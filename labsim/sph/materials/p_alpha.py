@@ -35,7 +35,7 @@ PARAMETERS = (
     parts.Parameter("elastic_speed", "1", 0.01, 1.0, 0.5, "sound speed of the foam over its solid's"),
     parts.Parameter("crush_start", "Pa", 1e-3, 1e11, 1e3, "end of the elastic range, soft foam"),
     parts.Parameter("crush_end", "Pa", 1e-2, 1e12, 1e5, "no pores are left, soft foam"),
-    parts.Parameter("cohesion", "Pa", 0.0, 1e11, 0.0, "none: hydrostatic, as in Herrmann (1969)"),
+    parts.Parameter("cohesion", "Pa", 0.0, 1e11, 1e3, "soft foam; 0: hydrostatic, as in Herrmann (1969)"),
     parts.Parameter("shear_modulus", "Pa", 1.0, 1e12, 1e5, "below half the porous body's bulk modulus"),
     parts.Parameter("tension", "Pa", 0.0, 1e12, 1e12, "none: holds together"),
     *parts.RATE,
