@@ -22,7 +22,7 @@ FOAM = Material(
     law="p_alpha",
     constants=(
         ("solid_modulus", MODULUS), ("elastic_speed", SPEED), ("crush_start", LOW), ("crush_end", HIGH),
-        ("shear_modulus", 1e3),
+        ("shear_modulus", 1e3), ("cohesion", 0.0),
     ),
 )  # fmt: skip
 
