@@ -21,12 +21,14 @@ from .materials._parts import Parameter
 KEY_UNITS = {
     "m": ("_mm", 1e-3),
     "rad": ("_deg", math.pi / 180),
+    "°": ("_deg", 1.0),
     "m/s": ("_m_s", 1.0),
     "s": ("_ms", 1e-3),
     "kg": ("_mg", 1e-6),
     "Pa": ("_Pa", 1.0),
     "kg/m^3": ("_kg_m3", 1.0),
     "1/s": ("_per_s", 1.0),
+    "s^n": ("", 1.0),
     "1": ("", 1.0),
 }
 

@@ -13,21 +13,23 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
-AGAIN = 15.0  # s of processor time for the second time: as long as the wait, but not lengthened by what else runs here
+AGAIN = 3.0  # processor time of the second time, over that of importing its libraries in the same minute: machines differ
+LIBRARIES = "import labsim.cli.demo, arviz, corner, matplotlib.pyplot"
 
 
-def run_demo(store: str, folder: Path) -> tuple[str, float]:
+def run_python(arguments: list[str]) -> tuple[str, float]:
+    """What it printed, and s of processor time."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        [sys.executable, "-m", "labsim", "demo", "-o", str(folder), "--store", store],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=1500,
+        [sys.executable, *arguments], capture_output=True, text=True, cwd=ROOT, timeout=1500
     )
     assert done.returncode == 0, done.stderr
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def run_demo(store: str, folder: Path) -> tuple[str, float]:
+    return run_python(["-m", "labsim", "demo", "-o", str(folder), "--store", store])
 
 
 @pytest.fixture(scope="module")
@@ -138,8 +140,10 @@ def test_a_second_time_takes_seconds_and_gives_the_same(
     shared_store: str, first: tuple[Path, str], tmp_path: Path
 ) -> None:
     _out, seconds = run_demo(shared_store, tmp_path)
+    _out, importing = run_python(["-c", LIBRARIES])
+    print(f"{seconds:.1f} s, importing {importing:.1f} s")
     before, after = load(first[0], "diagnosis.json"), load(tmp_path, "diagnosis.json")
     assert after["runs_new"] == 0 and after["runs_reused"] >= 40
-    assert seconds < AGAIN
+    assert seconds < AGAIN * importing
     for key in ("p_m_Pa", "p_value", "predictions", "sentence", "stopping_time_ratio"):
         assert after[key] == before[key]

@@ -1,6 +1,7 @@
 """``labsim simulate`` with another tip, motion and law; the same by the keys of a campaign; what each of them has not."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -13,7 +14,10 @@ from labsim.errors import CampaignError, InferenceError
 from labsim.inference.run_file import read_run_file
 from labsim.inference.supported import refuse_others
 from labsim.records import Motion
-from labsim.sph.tips import make_profile
+from labsim.sph.materials import find_law, list_laws
+from labsim.sph.motions import find_motion, list_motions
+from labsim.sph.plugins import key_of
+from labsim.sph.tips import find_tip, list_tips, make_profile
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("--spacing-um", "125", "--workers", "1", "--quiet")
@@ -206,3 +210,13 @@ def test_an_option_that_is_wrong(name: str, tmp_path: Path, capsys: pytest.Captu
     for word in words:
         assert word in said
     assert not (tmp_path / "out").exists()
+
+
+def test_every_parameter_has_a_key_that_toml_takes_bare():
+    """Of every law, tip and motion: letters, digits and _, no two alike."""
+    modules = [find_law(law) for law in list_laws()]
+    modules += [find_tip(tip) for tip in list_tips()] + [find_motion(motion) for motion in list_motions()]
+    for module in modules:
+        keys = [key_of(each)[0] for each in module.PARAMETERS]
+        assert len(set(keys)) == len(keys)
+        assert all(re.fullmatch(r"[A-Za-z0-9_]+", key) for key in keys), keys
