@@ -69,6 +69,12 @@ class CommandFolder(typer.core.TyperGroup):
                 ]
             )
 
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        for parameter in self.get_params(ctx):
+            if parameter.name == "show_completion":
+                parameter.help = "Show it, to copy or to change it."  # typer's own takes two lines
+        super().format_options(ctx, formatter)
+
     def list_commands(self, ctx: object) -> list[str]:
         return [name.rstrip("_").replace("_", "-") for name in list_command_files()]
 
