@@ -35,7 +35,7 @@ from labsim.diagnosis.screen import CONFUSABLE, screen
 from labsim.inference.calibrate import prepare
 from labsim.inference.runs import RunStore
 from labsim.inference.strength import Found, StrengthCount
-from labsim.inference.synthetic import QUIET, measure_hidden
+from labsim.inference.synthetic import LABORATORY, QUIET, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign, FloatArray
 
@@ -192,7 +192,8 @@ def hide_and_judge(
     truth.prepare([plan.hidden])
     drawing = time.process_time() - began
     strength = plan.strength
-    row = judge_hidden((campaign, store_at, truth, plan.hidden, 10 * seed + number, strength, strength))
+    seed, samples = 10 * seed + number, LABORATORY.samples
+    row = judge_hidden((campaign, store_at, truth, plan.hidden, seed, strength, strength, samples))
     return plan, {**row, "drawing": drawing}
 
 

@@ -1,7 +1,7 @@
 """Hide effects in campaigns of labsim's own solver at another spacing, and count what the diagnosis finds.
 
-    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 2] [--sigma 8,16] [--workers 2] [--drops D01,D02]
-                                           [--effects a,b] [--maps] [--store FOLDER] [--plan]
+    python benchmarks/own_campaigns.py OUT [--nulls 100] [--each 2] [--sigma 8,16] [--samples 0.02] [--workers 2]
+                                           [--drops D01,D02] [--effects a,b] [--maps] [--store FOLDER] [--plan]
 
 Writes OUT/strengths.json, what is hidden, and OUT/rows.jsonl, one line a campaign; a second call goes on where the first
 stopped. Prints false alarms and coverage on the nulls, exact and class hit rates per strength, p_m coverage with the extension, a
@@ -31,14 +31,14 @@ from scipy.stats import beta
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
 from labsim.diagnosis.average import average_p_m
-from labsim.diagnosis.campaign import judge_campaign
+from labsim.diagnosis.campaign import judge_scatters
 from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.runs import RunStore
 from labsim.inference.strength import Found, Search, StrengthCount
-from labsim.inference.synthetic import measure_hidden
+from labsim.inference.synthetic import LABORATORY, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 
@@ -72,13 +72,17 @@ def open_campaign(drops: str, maps: bool) -> tuple[Campaign, list[ReducedScan]]:
 
 
 def judge_hidden(
-    job: tuple[Campaign, Path | None, TruthTable, Hidden, int, float, float],
+    job: tuple[Campaign, Path | None, TruthTable, Hidden, int, float, float, float],
 ) -> dict:
     """Film one truth and judge it."""
-    campaign, store_at, truth, hidden, seed, strength, counted = job
+    campaign, store_at, truth, hidden, seed, strength, counted, samples = job
     began, busy = time.perf_counter(), time.process_time()
-    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed))
-    found = judge_campaign(*prepare(campaign, RunStore(store_at), workers=1, measurements=measurements))
+    laboratory = replace(LABORATORY, samples=samples)
+    measurements = measure_hidden(truth, hidden, np.random.default_rng(seed), laboratory=laboratory)
+    store = RunStore(store_at)
+    found = judge_scatters(
+        campaign, lambda terms: prepare(campaign, store, terms=terms, workers=1, measurements=measurements)
+    )
     names = found.screening.names
     alike = {
         name: {
@@ -96,6 +100,8 @@ def judge_hidden(
     return {
         "cause": hidden.cause,
         "values": {name: dict(values) for name, values in hidden.effects.items()},
+        "samples": samples,
+        "scatter": found.bench.terms.scatter,
         "strength": strength,
         "counted": counted,
         "seed": seed,
@@ -263,6 +269,7 @@ def main() -> None:
     parser.add_argument("--nulls", type=int, default=100)
     parser.add_argument("--each", type=int, default=2)
     parser.add_argument("--sigma", default="8,16")
+    parser.add_argument("--samples", type=float, default=LABORATORY.samples, help="scatter of ln p_m")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--drops", default=STANDARD, help="names with commas; empty for all of the campaign")
     parser.add_argument("--effects", default="")
@@ -297,7 +304,7 @@ def main() -> None:
         hidden = replace(each.hidden, p_m=p_m)
         if (hidden.cause, sigma, seed) not in done:
             known = truth.holding(hidden)
-            jobs.append((campaign, options.store, known, hidden, seed, sigma, each.strength))
+            jobs.append((campaign, options.store, known, hidden, seed, sigma, each.strength, options.samples))
     append_rows(
         log, judge_hidden, jobs, options.workers,
         lambda row: f" {row['cause']} {row['strength']:.0f}: {row['first']} {row['probability']:.2f}",

@@ -36,6 +36,7 @@ def read_sample(table: Table) -> Sample:
         diameter=table.number("diameter_mm", 1.0, 1000.0, unit=1e-3),
         depth=table.number("depth_mm", 0.5, 1000.0, unit=1e-3),
         gas_pressure=table.number("gas_pressure_Pa", 0.0, 1e6),
+        scatter=table.number("scatter", 0.0, 1.0) if table.has("scatter") else None,
     )
 
 

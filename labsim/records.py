@@ -38,6 +38,7 @@ class Sample:
     diameter: float  # m
     depth: float  # m
     gas_pressure: float  # Pa
+    scatter: float | None = None  # relative, of the strength from sample to sample, where it is known
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,19 @@ def test_a_campaign_is_read_in_si(campaign: Path) -> None:
     assert read_drop(campaign / "drops/D01") == drop
 
 
+def test_scatter_of_samples_is_optional(campaign: Path) -> None:
+    assert read_campaign(campaign).sample.scatter is None
+    file = campaign / C
+    stated = file.read_text()
+    for text, value in (("0.08", 0.08), ("8", None), ("-0.1", None)):
+        file.write_text(stated.replace("[sample]\n", f"[sample]\nscatter = {text}\n", 1))
+        if value is not None:
+            assert read_campaign(campaign).sample.scatter == value
+        else:
+            with pytest.raises(CampaignError, match=r"sample\.scatter"):
+                read_campaign(campaign)
+
+
 def test_the_published_campaign_says_what_is_assumed() -> None:
     read = read_campaign(SEED)
     assert read.geometry == "planar" and read.gravity == 0.0

@@ -26,6 +26,7 @@ monomer_density_kg_m3 = 2000.0      # of the solid grains, not of the dust
 diameter_mm = 25.0                  # of the container
 depth_mm = 20.0                     # of the dust in it
 gas_pressure_Pa = 10.0              # in the chamber during the drop
+# scatter = 0.05                    # optional: of the strength from sample to sample, relative; else estimated
 
 [material]                          # the nominal model of the dust; its p_m is what labsim calibrate finds
 p_m_range_Pa = [300.0, 6000.0]      # between what p_m is searched: the limits of the prior

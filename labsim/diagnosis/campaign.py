@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -11,7 +12,6 @@ import numpy as np
 
 from ..errors import ExtrapolationError
 from ..inference.calibrate import (
-    estimate_scatter,
     prepare,
     sample_fit,
     warn_of_range,
@@ -23,6 +23,15 @@ from ..inference.free_fall import doubt_scales
 from ..inference.measure import Measurements, measure
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
+from ..inference.scatter import (
+    Scatter,
+    ScatterEstimate,
+    estimate_scatter,
+    find_larger,
+    fit_with,
+    set_terms,
+    weigh_least,
+)
 from ..inference.settle import list_large, settle
 from ..inference.surface_rows import doubt_surface_rows
 from ..inference.workbench import Workbench
@@ -31,9 +40,8 @@ from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
-from .judge import PREDICTED, Verdict, judge
+from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, judge, weigh_prior
 from .pairs import confirm_pairs, return_to_singles, settle_leading
-from .scatter import find_larger, weigh_least
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
@@ -83,7 +91,7 @@ class Diagnosis(Judgement):
     posterior_nominal: Posterior
     posterior_extended: Posterior
     p_m_averaged: FloatArray
-    scatter: tuple[float, float]
+    scatter: ScatterEstimate
     runs_new: int
     runs_reused: int
     wall: float
@@ -131,22 +139,45 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     )
 
 
-def judge_scatters(open_with: Callable[[Terms], tuple[Workbench, Fit]], *, seed: int = 1) -> Judgement:
-    """judge_campaign with the least scatter of samples, or with what the nominal fit asks for where nothing else is needed then.
+def judge_scatters(
+    campaign: Campaign, open_with: Callable[[Terms], tuple[Workbench, Fit]], *, seed: int = 1
+) -> Judgement:
+    """Judge with the least scatter of samples, or with the larger one that the nominal model or the leading cause asks for.
 
-    open_with : a workbench and its nominal fit for given error terms. The larger scatter is taken where the nominal model has
-    more evidence with it than anything may reach with the least one, and is called none.
+    open_with : a workbench and its nominal fit for given error terms. A larger scatter is taken where the model that asks for it
+    stands, with its prior and its evidence, before all that was found with the least one. The nominal model is asked first: where
+    it stands before all that may be found at all, nothing is looked for with the least one.
     """
-    least = weigh_least(Terms().scatter)
-    bench, nominal = open_with(Terms())
+    terms = set_terms(campaign)
+    bench, nominal = open_with(terms)
+    least = weigh_least(terms.scatter)
     asked = find_larger(least, bench, nominal)
     if asked is not None:
-        wider, loose = open_with(replace(Terms(), scatter=asked.value))
+        _, loose = fit_with(asked, bench, nominal)
         if asked.log_prior + loose.evidence > least.log_prior + _promise(bench, nominal, seed):
-            found = judge_campaign(wider, loose, seed=seed)
-            if found.verdict.word == "none":
-                return found
-    return judge_campaign(bench, nominal, seed=seed)
+            return judge_campaign(*open_with(replace(terms, scatter=asked.value)), seed=seed)
+    found = judge_campaign(bench, nominal, seed=seed)
+    larger = _find_larger(found, least)
+    if larger is None:
+        return found
+    return judge_campaign(*open_with(replace(terms, scatter=larger)), seed=seed)
+
+
+def _find_larger(found: Judgement, least: Scatter) -> float | None:
+    """The scatter with which the nominal model or the leading cause stands before all that was found with the least one."""
+
+    def stand(fit: Fit) -> float:
+        return weigh_prior(fit.hypothesis, list(found.bench.effects)) + fit.evidence
+
+    unknown = math.log(PRIOR_UNKNOWN) + found.unknown.evidence
+    best, value = least.log_prior + max(unknown, *map(stand, [found.nominal, *found.rivals])), None
+    for fit in [found.nominal, found.leading][: 1 + bool(found.rivals)]:
+        asked = find_larger(least, found.bench, fit)
+        if asked is not None:
+            reached = asked.log_prior + stand(fit_with(asked, found.bench, fit)[1])
+            if reached > best:
+                best, value = reached, asked.value
+    return value
 
 
 def _promise(bench: Workbench, nominal: Fit, seed: int) -> float:
@@ -186,7 +217,7 @@ def diagnose_campaign(
             measurements=seen,
         )
 
-    found = judge_scatters(open_with, seed=seed)
+    found = judge_scatters(campaign, open_with, seed=seed)
     bench, nominal, best = found.bench, found.nominal, found.best
     held_nominal, posterior = _predict(bench, nominal, seed, progress)
     held_best, extended = (

@@ -41,6 +41,15 @@ class Verdict:
         return named
 
 
+def weigh_prior(hypothesis: Hypothesis, catalogue: Sequence[str]) -> float:
+    """ln of the prior probability of none (empty), one cause or a pair of those listed."""
+    causes = len(catalogue)
+    if len(hypothesis) == 2:
+        return math.log(PRIOR_PAIRS / max(causes * (causes - 1) / 2, 1))
+    share = (1 - PRIOR_NONE - PRIOR_UNKNOWN - PRIOR_PAIRS) / max(causes, 1)
+    return math.log(share if hypothesis else PRIOR_NONE)
+
+
 def judge(
     nominal: Fit,
     rivals: Sequence[Fit],
@@ -61,8 +70,7 @@ def judge(
     """
     singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
     pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
-    share = (1 - PRIOR_NONE - PRIOR_UNKNOWN - PRIOR_PAIRS) / max(len(catalogue), 1)
-    weight: dict[Hypothesis, float] = {("none",): math.log(PRIOR_NONE) + nominal.evidence}
+    weight: dict[Hypothesis, float] = {("none",): weigh_prior((), catalogue) + nominal.evidence}
     weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + unknown_evidence
     evidence: dict[Hypothesis, float] = {(name,): nominal.evidence + b for name, b in screened.items()}
     evidence |= {fit.hypothesis: fit.evidence for fit in singles}  # re-simulated, where it was
@@ -70,10 +78,8 @@ def judge(
     gain = {hypothesis: value - nominal.evidence for hypothesis, value in evidence.items()}
     most = max([0.0, *gain.values()])
     ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
-    count = max(len(catalogue) * (len(catalogue) - 1) / 2, 1)
     nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
     for hypothesis, value in gain.items():
-        prior = share if len(hypothesis) == 1 else PRIOR_PAIRS / count
         above = max(value, 0.0)
         tempered = most - (most - above) / (NESTED if set(hypothesis) < ahead else TEMPERATURE)
         # what explains less than a part of the best never stands before that part
@@ -81,7 +87,9 @@ def judge(
             most - (most - part) / NESTED - (part - above) / TEMPERATURE for part in nested if part >= above
         ]
         tempered = min([tempered, *behind])
-        weight[hypothesis] = math.log(prior) + nominal.evidence + tempered + min(value, 0.0)
+        weight[hypothesis] = (
+            weigh_prior(hypothesis, catalogue) + nominal.evidence + tempered + min(value, 0.0)
+        )
     if predicted < PREDICTED:
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from ..effects import list_effects
 from ..effects.model import Model
@@ -24,6 +23,7 @@ from .open_workbench import open_workbench
 from .posterior import Posterior, sample
 from .runs import Progress, RunStore
 from .scans import observe_scan
+from .scatter import ScatterEstimate, allow_scatter, estimate_scatter, set_terms
 from .settle import list_large, settle
 from .surface_rows import doubt_surface_rows
 from .target import make_target
@@ -38,14 +38,13 @@ OTHER_STARTS = (500.0, 3500.0)  # Pa
 
 @dataclass(frozen=True)
 class Calibration:
-    """What calibrate found. scatter : of ln p_m between samples, estimated here, with its standard uncertainty."""
+    """What calibrate found. scatter : of ln p_m between samples, as the residuals show it; bench.terms has the one in use."""
 
     campaign: Campaign
     bench: Workbench
     fit: Fit
     posterior: Posterior
-    scatter: float
-    scatter_sigma: float
+    scatter: ScatterEstimate
     p_value: float
     runs_new: int
     runs_reused: int
@@ -122,6 +121,7 @@ def calibrate(
     bench, nominal = prepare(
         campaign,
         store,
+        terms=set_terms(campaign),
         workers=workers,
         scheduler=scheduler,
         progress=progress,
@@ -139,10 +139,18 @@ def calibrate(
     fit = fit_hypothesis(bench, names, (nominal.log_p_m, {})) if names else nominal
     if list_large(bench, fit):
         fit = settle(bench, fit)
+    usual = bench.terms.scatter, goodness_of_fit(fit)
+    bench, fit, scatter = allow_scatter(bench, fit)
+    doubts = []
+    if scatter is not None:
+        doubts.append(
+            f"from drop to drop p_m scatters by {100 * scatter.value:.0f} %, more than the {100 * usual[0]:.0f} % of sieved dust "
+            f"(with which p = {usual[1]:.2g}); p_m and its error hold if the samples do differ by as much. A cause that changes "
+            "from drop to drop looks the same: labsim diagnose tells them apart"
+        )
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
-    scatter, sigma = estimate_scatter(bench, fit)
     p_value = goodness_of_fit(fit)
-    doubts = warn_of_range(bench, fit) + doubt_scales(bench.drops)
+    doubts += warn_of_range(bench, fit) + doubt_scales(bench.drops)
     if p_value < DOUBTFUL:
         doubts.append(
             f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
@@ -154,8 +162,7 @@ def calibrate(
         bench,
         fit,
         posterior,
-        scatter,
-        sigma,
+        estimate_scatter(bench, fit),
         p_value,
         store.new,
         store.reused,
@@ -225,31 +232,3 @@ def sample_fit(
         other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
         posterior.data.posterior["p_m_Pa"] = p_m * np.exp(other)
     return posterior
-
-
-def estimate_scatter(bench: Workbench, fit: Fit) -> tuple[float, float]:
-    """Scatter of ln p_m between samples by restricted maximum likelihood, with its standard uncertainty.
-
-    The likelihood is evaluated on a ladder of scatters with everything else as fitted; the drops' offsets enter through the
-    tangent of ln p_m.
-    """
-    ladder = np.array([0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.09, 0.13])
-    linear = fit.linear
-    tangent = linear.tangents["ln_p_m"]
-    used = bench.terms.scatter
-    value = []
-    for scatter in ladder:
-        covariance = linear.covariance.copy()
-        for section in linear.sections.values():
-            column = tangent[section]
-            covariance[section, section] += (scatter**2 - used**2) * np.outer(column, column)
-        lower = np.linalg.cholesky(covariance)
-        white = solve_triangular(lower, np.stack([linear.residual, tangent], axis=1), lower=True)
-        information = white[:, 1] @ white[:, 1]
-        left = white[:, 0] - white[:, 1] * (white[:, 1] @ white[:, 0]) / information
-        value.append(-0.5 * (left @ left) - np.sum(np.log(np.diag(lower))) - 0.5 * math.log(information))
-    weight = np.exp(np.array(value) - max(value))
-    fine = np.linspace(ladder[0], ladder[-1], 2000)
-    density = np.interp(fine, ladder, weight)
-    mean = float(np.sum(fine * density) / np.sum(density))
-    return mean, float(np.sqrt(np.sum((fine - mean) ** 2 * density) / np.sum(density)))

@@ -77,7 +77,7 @@ def write_campaign_page(
         extended = quantiles["extended"]
         tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))
         if probability < CERTAIN:
-            middle, spread = quantiles["averaged"]["q50"] / 1e3, _between(quantiles["averaged"])
+            middle, spread = quantiles["over_causes"]["q50"] / 1e3, _between(quantiles["over_causes"])
             tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
         tiles.append(("gone on held-out drops", percent, "of the removable discrepancy"))
     figures = _figures(found.bench, views, maps, posteriors)
@@ -159,7 +159,7 @@ def write_calibration_page(
         calibration=describe_calibration(
             found.fit,
             found.p_value,
-            (found.scatter, found.scatter_sigma),
+            found.scatter,
             posteriors,
             found.bench,
             len(views),

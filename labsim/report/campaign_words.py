@@ -9,6 +9,7 @@ import numpy as np
 
 from ..inference.fitting import Fit
 from ..inference.posterior import Posterior
+from ..inference.scatter import ScatterEstimate
 from ..inference.workbench import Workbench
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
@@ -64,7 +65,7 @@ def _left_out(drops: Sequence[Drop], used: dict[str, Any]) -> list[str]:
 def describe_calibration(
     fit: Fit,
     p_value: float,
-    scatter: tuple[float, float],
+    scatter: ScatterEstimate,
     posteriors: Sequence[tuple[str, Posterior]],
     bench: Workbench,
     drops: int,
@@ -79,7 +80,7 @@ def describe_calibration(
     )
     if drops > 1:
         words += (
-            f"From drop to drop p_m scatters by {100 * scatter[0]:.1f} ± {100 * scatter[1]:.1f} %; the likelihood allows "
+            f"From drop to drop p_m scatters by {100 * scatter.mean:.1f} ± {100 * scatter.sd:.1f} %; the likelihood allows "
             f"{100 * bench.terms.scatter:.2g} %. "
         )
     words += f"The sampling is converged: R-hat {first.r_hat:.3f}, {first.ess:.0f} independent samples."

@@ -1,0 +1,125 @@
+"""Samples that scatter by more than a model allows are neither a cause nor unknown."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import halfnorm
+
+from labsim.campaign import read_campaign
+from labsim.inference.calibrate import prepare
+from labsim.inference.fitting import goodness_of_fit
+from labsim.inference.measure import measure
+from labsim.inference.runs import RunStore
+from labsim.inference.scatter import WIDTH, allow_scatter, find_larger, find_scatter, set_terms, weigh_least
+
+CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
+DROPS, POINTS = 15, 6
+OFFSETS = 0.12 * np.array([1.0, -1.2, 0.4, -0.7, 1.3, -0.9])  # of ln p_m, of the first drops of one rod
+
+
+def set_residuals(scatter: float, seed: int, used: float = 0.02):
+    """A bench and a fit whose drops differ by ``scatter`` of ln p_m: points of 3e-6 m that p_m moves by 1e-4 m per ln."""
+    rng = np.random.default_rng(seed)
+    tangent = np.full(DROPS * POINTS, 1e-4)
+    sections = {f"D{k}": slice(k * POINTS, (k + 1) * POINTS) for k in range(DROPS)}
+    offsets = np.repeat(scatter * rng.standard_normal(DROPS), POINTS)
+    covariance = np.diag(np.full(DROPS * POINTS, 3e-7**2))
+    for section in sections.values():
+        covariance[section, section] += used**2 * np.outer(tangent[section], tangent[section])
+    residual = offsets * tangent + 3e-7 * rng.standard_normal(DROPS * POINTS)
+    linear = SimpleNamespace(
+        tangents={"ln_p_m": tangent}, covariance=covariance, sections=sections, residual=residual
+    )
+    campaign = SimpleNamespace(sample=SimpleNamespace(scatter=None))
+    bench = SimpleNamespace(terms=SimpleNamespace(scatter=used), campaign=campaign)
+    return bench, SimpleNamespace(linear=linear)
+
+
+@pytest.mark.parametrize(("scatter", "least"), [(0.02, 0), (0.06, 95), (0.10, 100)])
+def test_a_larger_scatter_is_asked_for_where_samples_have_one(scatter, least):
+    first = weigh_least(0.02)
+    found = [find_larger(first, *set_residuals(scatter, seed)) for seed in range(100)]
+    asked = [each.value for each in found if each is not None]
+    print(f"{scatter}: {len(asked)} of 100, {np.mean(asked or [0]):.3f}")
+    assert least <= len(asked) <= (100 if least else 10)
+    if least:  # the mean of a density that is skew: somewhat more than the truth
+        assert np.mean(asked) == pytest.approx(scatter, rel=0.15)
+
+
+def test_prior_of_a_scatter_is_what_it_stands_for():
+    """Against the exact likelihood of fifteen offsets with a free mean, each known to 3e-7 m/√6 over 1e-4 m."""
+    bench, fit = set_residuals(0.08, 5)
+    asked = find_scatter(bench, fit)
+    assert 0.05 < asked.value < 0.13
+    offsets = fit.linear.residual.reshape(DROPS, POINTS).mean(axis=1) / 1e-4
+    squares, noise = np.sum((offsets - offsets.mean()) ** 2), (3e-3) ** 2 / POINTS
+
+    def likelihood(scatter: float) -> float:
+        variance = scatter**2 + noise
+        return variance ** (-(DROPS - 1) / 2) * math.exp(-squares / (2 * variance))
+
+    mean = quad(lambda s: s * likelihood(s), 0.0025, 0.5)[0] / quad(likelihood, 0.0025, 0.5, points=[0.08])[0]
+    assert asked.value == pytest.approx(mean, rel=0.01)
+    meant = quad(lambda s: likelihood(s) * halfnorm.pdf(s, scale=WIDTH), 0.0025, 0.5, points=[0.08])[0]
+    assert math.exp(asked.log_prior) == pytest.approx(meant / likelihood(asked.value), rel=0.02)
+    assert math.exp(weigh_least(0.02).log_prior) == pytest.approx(halfnorm.cdf(0.03, scale=WIDTH))
+
+
+def stretch(drop, ratio):
+    """Depth and time below the surface times ``ratio``, which keeps the speed: so a depth goes with p_m, to its power of -0.3."""
+    inside = drop.time > drop.contact_time
+    since = drop.time - drop.contact_time
+    return replace(
+        drop,
+        time=np.where(inside, drop.contact_time + ratio * since, drop.time),
+        depth=np.where(inside, ratio * drop.depth, drop.depth),
+    )
+
+
+@pytest.fixture(scope="module")
+def one_rod(shared_store):
+    """Drops of one rod; makes the nominal fit of what their depths become with other p_m's, and of a stated scatter."""
+    campaign = read_campaign(CAMPAIGN)
+    rod = campaign.drops[0].projectile
+    drops = tuple(drop for drop in campaign.drops if drop.projectile == rod)[: OFFSETS.size]
+    campaign = replace(campaign, drops=drops, scans=())
+    seen = measure(campaign)
+
+    def open_with(offsets, stated=None):
+        other = replace(campaign, sample=replace(campaign.sample, scatter=stated))
+        moved = [
+            stretch(drop, math.exp(-0.3 * offset)) for drop, offset in zip(seen.drops, offsets, strict=True)
+        ]
+        store = RunStore(shared_store)
+        measurements = replace(seen, drops=moved)
+        return prepare(other, store, terms=set_terms(other), workers=1, measurements=measurements)
+
+    return open_with
+
+
+def test_p_m_is_as_uncertain_as_its_samples_scatter(one_rod):
+    bench, fit = one_rod(OFFSETS)
+    wider, loose, scatter = allow_scatter(bench, fit)
+    assert scatter is not None and 0.06 < scatter.value < 0.25
+    assert wider.terms.scatter == scatter.value and bench.terms.scatter == 0.02
+    assert goodness_of_fit(fit) < goodness_of_fit(loose)
+    own, wide = (math.sqrt(each.covariance[0, 0]) for each in (fit, loose))
+    added = math.sqrt(wide**2 - own**2)
+    # in this campaign's likelihood all drops of a rod count about alike
+    assert added == pytest.approx(math.sqrt((scatter.value**2 - 0.02**2) / OFFSETS.size), rel=0.3)
+
+
+def test_samples_alike_keep_the_least_scatter(one_rod):
+    bench, fit = one_rod(0 * OFFSETS)
+    assert allow_scatter(bench, fit)[1:] == (fit, None)
+
+
+def test_a_stated_scatter_is_taken(one_rod):
+    bench, fit = one_rod(OFFSETS, stated=0.08)
+    assert bench.terms.scatter == 0.08
+    assert allow_scatter(bench, fit)[1:] == (fit, None)
