@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..sph.materials import find_file, find_law, list_laws
+from ..sph.materials import SHELF, find_law, list_laws
 from . import options
 
 WIDE = 118  # columns that the table needs; a list below that, and into files
@@ -46,10 +46,10 @@ def _summarise(name: str) -> dict[str, Any]:
     title, _, rest = (module.__doc__ or "").strip().partition("\n")
     calibrated = module.CALIBRATED
     return {
-        "name": find_file(name).stem,
+        "name": SHELF.locate(name).stem,
         "title": title.rstrip("."),
         "description": rest.strip("\n"),
-        "file": str(find_file(name)),
+        "file": str(SHELF.locate(name)),
         "calibrated": {"name": calibrated.name, "range": [calibrated.low, calibrated.high]},
         "carries": list(module.State._fields),
         "parameters": [

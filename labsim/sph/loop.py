@@ -14,17 +14,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ._jit import SOLVER_HASH, loop_folder
-from .materials import find_law, hash_law, load_module
+from .materials import find_law, hash_law
+from .plugins import load_module
 
 TEMPLATE = Path(__file__).with_name("advance.py")
 LAW_IMPORT = re.compile(r"^from \.materials\.porous_dust import update\b.*$", re.MULTILINE)
 
 
-@functools.cache
 def load_loop(law: str) -> Callable[..., int]:
-    """``advance`` with the update of ``law`` in it."""
+    """``advance`` with the update of ``law`` in it, as its file is now."""
+    return _load_loop(law, hash_law(law))
+
+
+@functools.cache
+def _load_loop(law: str, source_hash: str) -> Callable[..., int]:
     module = find_law(law)
-    name = f"labsim_loop_{SOLVER_HASH}_{hash_law(law)}"
+    name = f"labsim_loop_{SOLVER_HASH}_{source_hash}"
     source, found = LAW_IMPORT.subn(
         f"from {module.__name__} import update", TEMPLATE.read_text(encoding="utf-8")
     )

@@ -1,6 +1,7 @@
-"""What is found by listing a folder: one file a tip, one file a motion, each with its own declared numbers.
+"""What is found by listing a folder: one file a law, one a tip, one a motion, each with its own declared numbers.
 
-What such a file makes is numbers (a profile, a path), and these are part of a run's key: its text is in no hash.
+What a tip or a motion makes is numbers (a profile, a path), and these are part of a run's key: its text is in no hash. The text
+of a law is in the hash of its own runs.
 """
 
 from __future__ import annotations
@@ -8,14 +9,14 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib
+import importlib.util
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 from ..errors import SimulationError
-from .materials import load_module
-from .materials._parts import Parameter
 
 # SI unit of a number -> how a key of a TOML file ends, and that unit in SI
 KEY_UNITS = {
@@ -31,6 +32,18 @@ KEY_UNITS = {
     "s^n": ("", 1.0),
     "1": ("", 1.0),
 }
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a law, a tip or a motion: its limits are those of what a setting may give, both included."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    default: float
+    source: str
 
 
 def key_of(parameter: Parameter) -> tuple[str, float]:
@@ -54,15 +67,27 @@ class Shelf:
         """Names of those that come with labsim."""
         return sorted(path.stem for path in self.folder.glob("*.py") if not path.stem.startswith("_"))
 
-    def find(self, name: str) -> ModuleType:
-        """The module of one: a name of ``list``, or the path of a file. Raises SimulationError."""
+    def locate(self, name: str) -> Path:
+        """The source of one: a name of ``list``, or the path of a file. Raises SimulationError."""
         path = Path(name) if name.endswith(".py") else self.folder / f"{name}.py"
         if not path.is_file() or path.stem.startswith("_"):
             raise SimulationError("simulation", self.key, f"{name!r} is none of {', '.join(self.list())}")
+        return path
+
+    def hash_source(self, name: str) -> str:
+        """Hash of the name and the source of one, as they are now."""
+        path = self.locate(name)
+        return hashlib.sha256(path.stem.encode() + b"\n" + path.read_bytes()).hexdigest()[:16]
+
+    def find(self, name: str) -> ModuleType:
+        """The module of one. A file from elsewhere is loaded under the hash of its content, so an edited one is another."""
+        known = sys.modules.get(f"{self.package}.{name}")
+        if known is not None:
+            return known
+        path = self.locate(name)
         if path.parent == self.folder:
             return importlib.import_module(f"{self.package}.{path.stem}")
-        text = hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-        return load_module(path, f"labsim_{self.folder.name}_{path.stem}_{text}")
+        return load_module(path, f"labsim_{self.folder.name}_{self.hash_source(name)}")
 
     def read_values(self, name: str, given: tuple[tuple[str, float], ...]) -> dict[str, float]:
         """All numbers of one, in SI: those given, the others at their defaults. Raises SimulationError where one is unknown or
@@ -87,5 +112,20 @@ class Shelf:
 
 @functools.cache
 def shelf(kind: str, key: str) -> Shelf:
-    """The shelf of ``tips`` or ``motions``."""
+    """The shelf of a folder here: ``materials``, ``tips`` or ``motions``."""
     return Shelf(f"{__package__}.{kind}", Path(__file__).parent / kind, key)
+
+
+def load_module(path: Path, name: str) -> ModuleType:
+    """Import a file under ``name``: compiled code on disk is found again by that name."""
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+    return sys.modules[name]

@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 import labsim.cli
-from labsim.sph.materials import FOLDER, find_law, list_laws
+from labsim.sph.materials import SHELF, find_law, list_laws
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -42,7 +42,7 @@ def test_one_law_as_text(law: str, columns: str, capsys, monkeypatch: pytest.Mon
 
 def test_a_law_of_your_own(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "my_clay.py"
-    shutil.copy(FOLDER / "von_mises.py", path)
+    shutil.copy(SHELF.folder / "von_mises.py", path)
     (law,) = json.loads(run(capsys, str(path), "--json"))["laws"]
     assert law["name"] == "my_clay" and law["file"] == str(path)
 

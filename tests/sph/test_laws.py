@@ -13,7 +13,7 @@ from labsim.errors import SimulationError
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, check_setting, simulate, solver_hash
 from labsim.sph.bodies import set_body
-from labsim.sph.materials import FOLDER, find_law, is_current, list_laws
+from labsim.sph.materials import SHELF, find_law, is_current, list_laws
 from labsim.sph.particles import fill_at_rest, name_rows
 
 CLAY = Material(law="von_mises")
@@ -119,7 +119,7 @@ def test_a_ball_on_other_matter(law, constants, phi):
 def test_a_law_from_elsewhere_is_the_same_law(clay, tmp_path):
     """The same text in another folder, in another process: same numbers, and the next one compiles nothing."""
     path = tmp_path / "von_mises.py"
-    shutil.copy(FOLDER / "von_mises.py", path)
+    shutil.copy(SHELF.folder / "von_mises.py", path)
     program = (
         "import sys; sys.path[:0] = " + repr(sys.path) + "\n"
         "import importlib.util as u; s = u.spec_from_file_location('t', " + repr(__file__) + ")\n"

@@ -7,7 +7,7 @@ import pytest
 
 from labsim.records import Material
 from labsim.sph.bodies import set_body
-from labsim.sph.materials import FOLDER, find_law
+from labsim.sph.materials import SHELF, find_law
 from labsim.sph.particles import fill_at_rest, name_rows
 
 MATERIAL, SOLID = Material(), 2000.0
@@ -63,7 +63,7 @@ def test_the_law_meets_every_closed_form():
 def test_a_mutant_is_found_out(name, tmp_path):
     file = tmp_path / "porous_dust.py"
     old, new = MUTANTS[name]
-    source = (FOLDER / file.name).read_text()
+    source = (SHELF.folder / file.name).read_text()
     assert source.count(old) == 1
     source = (
         source.replace(old, new).replace("from ...", "from labsim.").replace("from ..", "from labsim.sph.")

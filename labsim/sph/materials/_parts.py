@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from ...errors import SimulationError
 from ...records import FloatArray
 from .._jit import compiled
+from ..plugins import Parameter
 from . import find_law
 
 if TYPE_CHECKING:
@@ -26,18 +26,6 @@ TERMS = {
     "crust_excess": 0.0,
     "filling_gradient": 0.0,
 }
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of a law: its limits are those of ``Material.constants``, both included."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    default: float
-    source: str
 
 
 class Calibrated(NamedTuple):
