@@ -57,5 +57,5 @@ def check_size(path: object, key: str, height: int, width: int) -> None:
         )  # fmt: skip
 
 
-def _read(file, kind: str) -> int:  # type: ignore[no-untyped-def]
+def _read(file, kind: str) -> int:
     return int(struct.unpack(kind, file.read(struct.calcsize(kind)))[0])

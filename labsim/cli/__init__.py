@@ -71,7 +71,7 @@ class CommandFolder(typer.core.TyperGroup):
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         for parameter in self.get_params(ctx):
-            if parameter.name == "show_completion":
+            if parameter.name == "show_completion" and hasattr(parameter, "help"):
                 parameter.help = "Show it, to copy or to change it."  # typer's own takes two lines
         super().format_options(ctx, formatter)
 
@@ -84,7 +84,7 @@ class CommandFolder(typer.core.TyperGroup):
             ctx.fail(f"No such command {name!r} (did you mean {' or '.join(near[:2])}?)")
         return super().resolve_command(ctx, args)
 
-    def get_command(self, ctx: object, cmd_name: str):  # type: ignore[no-untyped-def]
+    def get_command(self, ctx: object, cmd_name: str):
         module_name = cmd_name.replace("-", "_")
         if keyword.iskeyword(module_name):
             module_name += "_"
@@ -138,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         options.drop_empty_folder()
         status = _complain(str(trouble), 2)
     except BrokenPipeError:  # head, or a pager that was left
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = None
         status = 0
     except (
         OSError

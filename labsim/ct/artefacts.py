@@ -59,10 +59,13 @@ def fit_cupping(stack: SliceStack, axis: tuple[float, float], bead: Bead, surfac
         covariance = np.linalg.inv((a * count[:, None]).T @ a) * chi2
         if best is None or chi2 < 0.7 * best[2]:
             best = (solution, float(np.sqrt(end @ covariance @ end)), chi2, float(np.std(residual)))
+    assert best is not None
     solution, sigma, _, left_over = best
     amount = float(solution[1:].sum())
-    full = sum(c * np.minimum(rho, 1.2) ** p for c, p in zip(solution[1:], (2, 4), strict=False))
-    full = full - full[inside].mean()
+    full = np.zeros_like(rho)
+    for coefficient, power in zip(solution[1:], (2, 4), strict=False):
+        full += coefficient * np.minimum(rho, 1.2) ** power
+    full -= full[inside].mean()
     followed = abs(amount) > 4 * sigma and abs(amount) > 0.003 * (surface.dust - surface.air)
     level = float(deep[inside].mean())
     return Cupping(amount, sigma, left_over, followed, full.astype(np.float32) if followed else 0.0, level)
@@ -85,7 +88,7 @@ def measure_rings(
     if stack.count - start < 4:
         return None, 0.0
     rows = range(start, stack.count)
-    deep = np.mean([stack.slice(k) for k in rows], axis=0, dtype=np.float64)
+    deep: FloatArray = np.asarray(np.mean([stack.slice(k) for k in rows], axis=0, dtype=np.float64))
     if cupping.followed:
         deep = remove_cupping(deep, cupping, surface)
     index, reach = _ring_index(*deep.shape)

@@ -112,8 +112,10 @@ class SectorAverage:
 
     def sums(self) -> SectorSums:
         fold = (self.nz, self.nr, SECTORS)
-        parts = (a.reshape(fold) for a in (self.total, self.square, self.voxels, self.masked))
-        return SectorSums(*parts, np.arange(self.nr + 1.0) * self.cell, self.cell)
+        total, square, voxels, masked = (
+            each.reshape(fold) for each in (self.total, self.square, self.voxels, self.masked)
+        )
+        return SectorSums(total, square, voxels, masked, np.arange(self.nr + 1.0) * self.cell, self.cell)
 
 
 @dataclass(frozen=True)

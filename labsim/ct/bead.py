@@ -71,7 +71,9 @@ def find_bead(stack: SliceStack, scan: Scan) -> Bead:
         _check_radius(scan, coarse, stated, COARSE_REACH if saturated else 0.0)
     else:
         directions = directions[directions[:, 2] > 0.1]  # the rod hides the upper half
-    fit, rms, outside = middle, 0.0, np.zeros(len(directions))
+    fit: FloatArray = middle
+    outside: FloatArray = np.zeros(len(directions))
+    rms = 0.0
     radius = stated
     for _ in range(3):
         points, outside, used = _edge_points(box, fit, directions, radius, level, top)

@@ -57,7 +57,7 @@ def compress(
     return CompressedVolume(np.asarray(thresholds, float), np.minimum.accumulate(volume), spread, sphere)
 
 
-def _refine(scan_map: FillingMap, inside: np.ndarray):  # type: ignore[no-untyped-def]
+def _refine(scan_map: FillingMap, inside: np.ndarray):
     """Function (map -> values of sub-cells) and the volume of every sub-cell, m^3: FINER^2 a cell, bilinear between centres.
 
     A contour cuts cells; counting whole ones would make the curve jump. Sub-cells in the bead are left out.

@@ -134,7 +134,8 @@ def _find_levels(
         )  # of a few rows the spread is itself uncertain
         limit = max(ODD * noise, LEVEL_LEAST * (surface.dust - surface.air))
         odd += [
-            (max(k - 1, 0), min(k + 1, len(rows) - 1)) for k in np.flatnonzero(part & (np.abs(off) > limit))
+            (max(k - 1, 0), min(k + 1, len(rows) - 1))
+            for k in map(int, np.flatnonzero(part & (np.abs(off) > limit)))
         ]
     return odd
 
@@ -151,9 +152,10 @@ def _find_outlines(stack: SliceStack, bead: Bead, surface: Surface, top: float) 
     dust = max(surface.dust, surface.air)
     inner = stack.slice(round(k0))[round(y0) - 1 : round(y0) + 2, round(x0) - 1 : round(x0) + 2]
     threshold = 0.5 * (min(float(np.median(inner)), 0.98 * top) + dust)
-    rows = np.arange(first, last + 1)
+    numbers = range(first, last + 1)
+    rows = np.array(numbers)
     square, middle = np.empty(len(rows)), np.empty((len(rows), 2))
-    for i, k in enumerate(rows):
+    for i, k in enumerate(numbers):
         window = stack.slice(k)[low_y : round(y0) + half + 1, low_x : round(x0) + half + 1]
         above = window > threshold
         square[i] = above.sum() / np.pi
@@ -211,7 +213,9 @@ def _find_steps(
         # a mean over few blocks, where the bead hides the others, scatters more
         alike = beyond * np.sqrt(blocks_used / max(blocks_used.max(), 1))
         odd = (alike > ODD * _spread(alike)) & (beyond > STEP_LEAST)
-        for i in np.flatnonzero(odd):  # a step shows in the windows around it: its largest is where it is
+        for i in map(
+            int, np.flatnonzero(odd)
+        ):  # a step shows in the windows around it: its largest is where it is
             if values[i] == values[max(0, i - WINDOW) : i + WINDOW + 1].max():
                 found.append((int(places[i]), int(places[i]) + 1))
     return found

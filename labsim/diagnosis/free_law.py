@@ -143,7 +143,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
             break
         own, size = max(
             ((choose_hats(found, freedom), size) for freedom in EMBEDDED for size in SIZES),
-            key=lambda each: integrate(found, *each, (low, high)).evidence,
+            key=lambda each: integrate(found, each[0], each[1], (low, high)).evidence,
         )
         priors = {name: (values[name], size * scales[name]) for name in own}
         step, covariance, _, _, weighted = solve_globals(linear.blocks, ["ln_p_m", *own], priors)

@@ -153,7 +153,7 @@ def measure_gain(nominal: HeldOut, extended: HeldOut) -> Gain:
     before, after, noise = pool(nominal.rms), pool(extended.rms), pool(extended.expected)
     difference = extended.log_score - nominal.log_score
     if math.isnan(before):
-        return Gain(*[math.nan] * 5, fraction_removed=math.nan)
+        return Gain(*[math.nan] * 6)
     removable = max(before**2 - noise**2, 1e-30)
     fraction = (
         float(np.clip(1 - max(after**2 - noise**2, 0.0) / removable, 0.0, 1.0)) if before > noise else 0.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
 from ..inference.fitting import Fit
 from ..inference.workbench import Workbench
+from ..records import Campaign
 from ..sph import DropSetting
 
 PRESSURE = 400.0  # Pa, what stops a drop of 0.65 m/s by the published 625 Pa s/m: the unit of the forces
@@ -99,7 +101,7 @@ def make_hats(law: FreeLaw, deepest: Mapping[DropSetting, float] | None = None) 
         )
         hats[name] = Effect(
             name, name, "material", (parameter,), "", (), {}, Path(__file__), lambda campaign: "",
-            _add(law, unit, knot, deepest or {}), None, lambda campaign, parameter=parameter: (parameter,),
+            _add(law, unit, knot, deepest or {}), None, partial(_give, (parameter,)),
         )  # fmt: skip
     return hats
 
@@ -135,3 +137,8 @@ def combine(before: Knots, table: Knots, *, product: bool = False) -> Knots:
     places = sorted({x for x, _ in (*before, *table)})
     first, second = (np.interp(places, *np.asarray(each).T) for each in (before, table))
     return tuple(zip(places, (first * second if product else first + second).tolist(), strict=True))
+
+
+def _give(parameters: tuple[Parameter, ...], campaign: Campaign) -> tuple[Parameter, ...]:
+    """The parameters of one hat, the same in every campaign."""
+    return parameters

@@ -54,10 +54,10 @@ def confirm_pairs(
         if not known and log_bayes > max(top, 0.0) + LEAST_GAIN:
             starts[pair] = nominal
     fits = []
-    for pair, start in starts.items():
-        begin = (start.log_p_m, {name: start.values.get(name, 0.0) for name in pair})
+    for both, start in starts.items():
+        begin = (start.log_p_m, {name: start.values.get(name, 0.0) for name in both})
         with suppress(ExtrapolationError):
-            fits.append(fit_hypothesis(bench, pair, begin, nuisances=start))
+            fits.append(fit_hypothesis(bench, both, begin, nuisances=start))
     return fits
 
 

@@ -17,7 +17,16 @@ from typing import Literal
 import numpy as np
 
 from ..errors import EffectError
-from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Material, Projectile, Sample
+from ..records import (
+    STANDARD_GRAVITY,
+    Campaign,
+    FloatArray,
+    Material,
+    Projectile,
+    PublishedScan,
+    Sample,
+    Scan,
+)
 from ..sph import DropSetting
 from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
 
@@ -226,11 +235,15 @@ def list_places(campaign: Campaign) -> dict[str, Place]:
         places[drop.name] = Place(
             drop.name, fraction, False, campaign.sample, campaign.material, drop.projectile.tip, smallest
         )
-    for scan in (*campaign.scans, *campaign.published_scans):
+    for scan in _list_scans(campaign):
         places[scan.name] = Place(
             scan.name, 0.0, True, campaign.sample, campaign.material, scan.projectile.tip, smallest
         )
     return places
+
+
+def _list_scans(campaign: Campaign) -> list[Scan | PublishedScan]:
+    return [*campaign.scans, *campaign.published_scans]
 
 
 def list_thrown(campaign: Campaign) -> list[tuple[float, float, float]]:
@@ -245,7 +258,7 @@ def _list_impacts(campaign: Campaign) -> list[tuple[Projectile, float]]:
         if drop.published and drop.published.impact_speed:
             speed = drop.published.impact_speed.value
         impacts.append((drop.projectile, speed))
-    for scan in (*campaign.scans, *campaign.published_scans):
+    for scan in _list_scans(campaign):
         impacts.append((scan.projectile, scan.speed.value))
     return impacts
 

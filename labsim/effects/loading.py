@@ -214,7 +214,7 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
     return Effect(
         name=file.stem,
         title=text("title"),
-        kind=kind,  # type: ignore[arg-type]
+        kind=kind,
         parameters=resolve(reference_campaign()),
         leaves=text("leaves"),
         references=references,

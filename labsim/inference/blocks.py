@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +25,7 @@ class Block:
 
     residual: FloatArray
     covariance: FloatArray
-    tangents: dict[str, FloatArray]
+    tangents: Mapping[str, FloatArray]
     free: FloatArray | None = None
     by_speed: FloatArray | None = None
 

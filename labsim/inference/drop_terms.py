@@ -69,8 +69,8 @@ class DropTerms:
     white: FloatArray
     local: FloatArray
     pull: FloatArray
-    tangents: dict[str, FloatArray]
-    shared: dict[str, FloatArray]
+    tangents: Mapping[str, FloatArray]
+    shared: Mapping[str, FloatArray]
     numerical: NumericalError
 
 

@@ -47,7 +47,7 @@ class ProcessWorkers(Executor):
         self._unfinished = 0  # calls, only a hint for how many workers to start
         atexit.register(self.end)
 
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+    def submit(self, fn, /, *args, **kwargs):
         future: Future = Future()
         with self._lock:
             if self._ended:

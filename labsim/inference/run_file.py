@@ -166,7 +166,7 @@ def read_run_file(path: Path | str) -> DropRun | FailedRun:
         raise
     except DAMAGE as trouble:
         raise InferenceError(path, "", f"is not a stored run ({trouble}); make it again") from None
-    assert run is not None
+    assert isinstance(run, DropRun | FailedRun)
     return run
 
 
@@ -238,7 +238,7 @@ def _build(kind: type, values: dict[str, Any]) -> Any:
     built = {}
     for name, value in values.items():
         if dataclasses.is_dataclass(hints[name]):
-            built[name] = _build(hints[name], value)  # type: ignore[arg-type]
+            built[name] = _build(hints[name], value)
         else:
             built[name] = _as_tuple(value)
     return kind(**built)

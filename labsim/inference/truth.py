@@ -96,7 +96,8 @@ class TruthTable:
         if not settings:
             return
         runs = self.store.get_many(settings, workers=self.workers, progress=self.progress, text="truths")
-        parts, at = [], 0
+        parts: list[list[DropRun]] = []
+        at = 0
         for family, _, _ in jobs:
             part = runs[at : at + len(family.speeds)]
             parts.append([run for run in part if isinstance(run, DropRun) and run.stopped])
@@ -109,11 +110,11 @@ class TruthTable:
         if NOMINAL in failed:
             raise SimulationError("simulation", "truth", "a nominal run failed; nothing can be hidden")
         # nominal ones come first: changes are differences from them
-        for (family, variant, k), part in sorted(
+        for (family, variant, k), found in sorted(
             zip(jobs, parts, strict=True), key=lambda job: job[0][1] != NOMINAL
         ):
             for table, encode in family.tables if variant not in failed else ():
-                codes = np.array([encode(run) for run in part])
+                codes = np.array([encode(run) for run in found])
                 index = PLACES[k]
                 if variant == NOMINAL:
                     table.base[index] = codes

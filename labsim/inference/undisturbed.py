@@ -94,7 +94,7 @@ def linearise_undisturbed(
     covariance = np.diag(sigma**2) + SMOOTH**2 * same * np.exp(-0.5 * (apart / SMOOTH_LENGTH) ** 2)
     level = row * math.hypot(filling_factor_sigma, GREY * float(np.mean(data[row > 0])))
     covariance += np.outer(level, level) + POINT_SPREAD_SIGMA[1] ** 2 * np.outer(spread, spread)
-    tangents = {"ln_p_m": np.zeros(data.size)}
+    tangents: dict[str, FloatArray] = {"ln_p_m": np.zeros(data.size)}
     for name, (seen, step) in probes.items():
         tangents[name] = (_expect(dust, seen) - here) / step
     # an unnamed layering is the same in all samples, and grows with nothing but depth

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
-from ..sph import DropRun
 from .curves import encode_run
 from .drop_model import DropModel
 from .drop_terms import Terms
@@ -63,7 +63,7 @@ class Workbench:
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
-        tables: list[tuple[ResponseTable, Callable[[DropRun], FloatArray]]]
+        tables: list[tuple[ResponseTable, Callable[[Any], FloatArray]]]  # of the part of a run that it reads
         if not self.families[number].is_scan:
             tables = [(self.tables[number], encode_run)]
         else:
@@ -127,7 +127,7 @@ class Workbench:
     def change(self, name: str, amplitude: float) -> Change:
         effect, values = self.effects[name], self.at(name, amplitude)
 
-        def apply(setting):  # type: ignore[no-untyped-def]
+        def apply(setting):
             return effect.apply(setting, values, self.place_of(setting.projectile.tip))
 
         return apply

@@ -26,7 +26,7 @@ LOOK_EVERY, SAID_AFTER, GIVEN_UP_AFTER = 5.0, 60.0, 600.0
 class InProcess(Executor):
     """Runs at once, here: one worker gives the same numbers as many."""
 
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+    def submit(self, fn, /, *args, **kwargs):
         future: Future = Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -44,7 +44,7 @@ class OnDask(Executor):
         self._solver = solver_hash()
         self.address = address
 
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+    def submit(self, fn, /, *args, **kwargs):
         return self._executor.submit(run_with_solver, self._solver, fn, *args, **kwargs)
 
     def count_workers(self) -> int:

@@ -41,7 +41,7 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
         grid = _divide(figure, lines, columns, right=0.12, wspace=0.22, hspace=0.28)
         for k, view in enumerate(views):
             cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
-            above, below = np.ravel(cell.subplots())
+            above, below = np.ravel(np.asarray(cell.subplots()))
             clock = view.clock * 1e3
             above.plot(clock, view.measured * 1e3, ".", color=INK, ms=4, label="measured")
             below.axhline(0.0, color=INK, lw=0.6)

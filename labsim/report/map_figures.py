@@ -63,7 +63,7 @@ def _mirror(scan_map: FillingMap, values: FloatArray) -> tuple[FloatArray, Float
     return r, scan_map.z * 1e3, np.concatenate([values[:, ::-1], values], axis=1)
 
 
-def _show(axis: Axes, scan_map: FillingMap, values: FloatArray, colours: dict[str, Any]):  # type: ignore[no-untyped-def]
+def _show(axis: Axes, scan_map: FillingMap, values: FloatArray, colours: dict[str, Any]):
     r, z, mirrored = _mirror(scan_map, values)
     image = axis.pcolormesh(r, z, mirrored, shading="nearest", **colours)
     radius, centre = scan_map.bead_radius * 1e3, (scan_map.bead_radius - scan_map.tip_depth) * 1e3

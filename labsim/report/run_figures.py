@@ -55,7 +55,11 @@ def _draw_push(run: DropRun, path: Path) -> Path:
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.set(xlabel="depth of the tip (mm)", ylabel="force (N/m)" if planar else "force (N)")
         pressure = axes.secondary_yaxis(
-            "right", functions=(lambda force: force / area / 1e3, lambda kilo: kilo * area * 1e3)
+            "right",
+            functions=(
+                lambda force: np.divide(force, area * 1e3),
+                lambda kilo: np.multiply(kilo, area * 1e3),
+            ),
         )
         pressure.set_ylabel("force over the tip's largest section (kPa)")
         axes.set_title(

@@ -161,10 +161,10 @@ def draw_table(
     return path
 
 
-def _band(axes, t: FloatArray, value: FloatArray, sigma: FloatArray, label: str | None) -> None:  # type: ignore[no-untyped-def]
+def _band(axes, t: FloatArray, value: FloatArray, sigma: FloatArray, label: str | None) -> None:
     axes.fill_between(t, value - sigma, value + sigma, color=BLUE, alpha=0.3, lw=0)
     axes.plot(t, value, color=BLUE, label=label)
 
 
-def _points(axes, t: FloatArray, value: FloatArray, sigma: FloatArray) -> None:  # type: ignore[no-untyped-def]
+def _points(axes, t: FloatArray, value: FloatArray, sigma: FloatArray) -> None:
     axes.errorbar(t, value, sigma, fmt=".", ms=3, color=GREEN, elinewidth=0.7, alpha=0.8)

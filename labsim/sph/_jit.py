@@ -36,7 +36,9 @@ def hash_sources() -> str:
 SOLVER_HASH = hash_sources()
 
 if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("labsim")) / "compiled" / SOLVER_HASH)
+    numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # set when numba is imported
+        Path(platformdirs.user_cache_dir("labsim")) / "compiled" / SOLVER_HASH
+    )
 
 # A loop over particles reads and writes two dozen rows, and each pair of them needs a test that they do not overlap before the
 # loop may be vectorised; by default the compiler gives up at eight tests. Rows never overlap, a test costs a nanosecond.

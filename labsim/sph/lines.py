@@ -7,6 +7,8 @@ transposition leaves in a small contiguous buffer, and the compiler vectorises t
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -91,7 +93,7 @@ read_eight = _make_reader(8)
 
 
 @intrinsic
-def write_lines(typing, lines, first, a, b, c, d, e, f, g, h):
+def _write_lines(typing, lines, first, a, b, c, d, e, f, g, h):
     """Numbers ``first`` to ``first + 7`` of eight rows into the lines of these particles."""
     signature = types.void(lines, first, a, b, c, d, e, f, g, h)
 
@@ -108,3 +110,6 @@ def write_lines(typing, lines, first, a, b, c, d, e, f, g, h):
         return context.get_dummy_value()
 
     return signature, generate
+
+
+write_lines: Any = _write_lines  # numba passes the first argument, which no type says

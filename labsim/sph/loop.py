@@ -35,7 +35,7 @@ def _load_loop(law: str, source_hash: str) -> Callable[..., int]:
     )
     assert found == 1
     source = re.sub(r"^from \.(\w+) import", rf"from {__package__}.\1 import", source, flags=re.MULTILINE)
-    return load_module(_write_once(source, name), name).advance  # type: ignore[no-any-return]
+    return load_module(_write_once(source, name), name).advance
 
 
 def _write_once(source: str, name: str) -> Path:

@@ -37,7 +37,7 @@ def differentiate_field(
     step = field[source[j]] - field[i]
 
     def total(values: FloatArray) -> FloatArray:
-        return np.bincount(i, values, n)
+        return np.asarray(np.bincount(i, values, n), dtype=float)
 
     rr, rz, zz = total(weight * dr * dr), total(weight * dr * dz), total(weight * dz * dz)
     by_r, by_z = total(weight * dr * step), total(weight * dz * step)

@@ -265,4 +265,5 @@ class _Fall:
             values[:, i] = disc.y, disc.x, disc.sigma, disc.smear
             radii.append(disc.radius)
         spread = float(np.std(radii)) / np.sqrt(len(radii))
-        return BeadTrack(*values, self.reason, float(np.median(radii)), max(spread, 0.02))
+        y, x, sigma, smear = values
+        return BeadTrack(y, x, sigma, smear, self.reason, float(np.median(radii)), max(spread, 0.02))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -58,7 +59,7 @@ class Choice:
         values, variances, weights = [], [], []
         for candidate, weight in zip(self.candidates, self.weights, strict=True):
             motion = candidate.motion
-            value, sigma = motion.propagate(lambda p, motion=motion: quantity(motion, p))
+            value, sigma = motion.propagate(partial(quantity, motion))
             if np.all(np.isfinite(value)):
                 values.append(value)
                 variances.append(growth * sigma**2)

@@ -70,7 +70,7 @@ def _fit_edge(
 
 def measure_distance(opacity: FloatArray, contour: float = CONTOUR) -> tuple[FloatArray, int]:
     """Signed distance (px, positive inside) of every pixel from a contour, and the number of its points."""
-    slope = np.stack(np.gradient(opacity), axis=-1)
+    slope = np.stack(list(np.gradient(opacity)), axis=-1)
     points, normals = [], []
     for axis in (0, 1):
         first = opacity[:-1] if axis == 0 else opacity[:, :-1]
@@ -84,7 +84,7 @@ def measure_distance(opacity: FloatArray, contour: float = CONTOUR) -> tuple[Flo
     if len(spots) == 0:
         return np.full(opacity.shape, np.inf), 0
     normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
-    grid = np.stack(np.mgrid[: opacity.shape[0], : opacity.shape[1]], axis=-1).reshape(-1, 2).astype(float)
+    grid = np.moveaxis(np.mgrid[: opacity.shape[0], : opacity.shape[1]], 0, -1).reshape(-1, 2).astype(float)
     away, nearest = cKDTree(spots).query(grid)
     along = np.sum((grid - spots[nearest]) * normal[nearest], axis=1)
     # beyond the ends of the contour the nearest point lies aside: there the distance itself, with its sign

@@ -111,7 +111,7 @@ def fit_disc(
     sigma = float(np.sqrt(max(inverse[0, 0], 0.0) * variance))
     arc = _see_arc(usable, q, along)
     q[3] += q[4] ** 2 / (2 * q[3])  # to first order a blurred disc looks p²/(2R) smaller than it is
-    return Disc(*q[:2], sigma, *q[2:6], float(np.sqrt(variance)), arc)
+    return Disc(q[0], q[1], sigma, q[2], q[3], q[4], q[5], float(np.sqrt(variance)), arc)
 
 
 @cache

@@ -35,7 +35,9 @@ def build_template(
     views: list[View], scene: Scene, usable: np.ndarray, top: int, left: int, shape: tuple[int, int]
 ) -> Template | None:
     """Average opacity of shape ``shape`` around the end, its [0, 0] at (top, left) from the origin; None if none fits."""
-    spots = [(v.y, v.x, scene.projectile_level * v.brightness, v.brightness) for v in views]
+    spots: list[tuple[float, float, float, float] | None] = [
+        (v.y, v.x, scene.projectile_level * v.brightness, v.brightness) for v in views
+    ]
     template: Template | None = None
     for turn in range(PASSES):
         total, weight = np.zeros(shape), np.zeros(shape)
@@ -68,7 +70,7 @@ def build_template(
         template = Template(opacity, top, left, weight > 0)
         if turn == PASSES - 1:
             break
-        renewed = []
+        renewed: list[tuple[float, float, float, float] | None] = []
         for view, spot in zip(views, spots, strict=True):
             start = spot if spot is not None else (view.y, view.x, scene.projectile_level, view.brightness)
             fit = register(

@@ -85,7 +85,7 @@ def propose_moves(
     missing, doubled = np.zeros(row.size), np.zeros(row.size)
     for index, count in find_gaps((time - time[0]) / spacing, rows, sigma, repeated):
         (missing if count > 0 else doubled)[index:] += count
-    found = [np.zeros(row.size)]
+    found: list[FloatArray] = [np.zeros(row.size)]
     for moved in (missing + doubled, missing - np.cumsum(repeated)):
         if not any(np.array_equal(moved * spacing, other) for other in found):
             found.append(moved * spacing)

@@ -96,7 +96,7 @@ def compare_with_edge(
     difference -= np.nanmedian(difference)
     spread = max(1.4826 * float(np.nanmedian(np.abs(difference))), float(np.nanmedian(error)))
     wrong = known & (np.abs(difference) > np.maximum(0.08, 6 * spread))
-    for i in np.flatnonzero(wrong):
+    for i in map(int, np.flatnonzero(wrong)):
         reason[i] = "registration and edge disagree"
     rms = float(np.sqrt(np.mean(difference[known & ~wrong] ** 2)))
     if spread > 3 * float(np.nanmedian(error)) and spread > 0.02:

@@ -32,7 +32,7 @@ def weigh_pixel(value: float, model: float, variance: float, ceiling: float) -> 
 
 
 @njit(cache=True)
-def accumulate(  # type: ignore[no-untyped-def]
+def accumulate(
     c, wy, gy, wx, gx, row0, column0, h, w, image, ground, mask, theta, read_variance, gain, huber, ceiling
 ):  # pragma: no cover - compiled
     """Normal equations of one Gauss-Newton step: Fisher matrix (6, 6), right side (6,), and (χ², information kept,
@@ -89,7 +89,7 @@ def accumulate(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def solve_step(fisher, right):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def solve_step(fisher, right):  # pragma: no cover - compiled
     """Gauss-Newton step (6,): fisher · step = right by Cholesky, each parameter in units of its own information.
 
     A billionth is added to the diagonal so that a parameter without a pixel stands still. NaN where it cannot be solved.

@@ -18,7 +18,7 @@ def write_movie(pictures: Iterable[npt.NDArray[np.uint8]], path: Path, rate: flo
     for picture in pictures:
         rows, columns = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2  # the codec wants even sizes
         if movie is None:
-            movie = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), rate, (columns, rows))
+            movie = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate, (columns, rows))
             if not movie.isOpened():
                 raise MeasurementError(path, "movie", "cannot be written: OpenCV has no MP4 encoder here")
         movie.write(np.ascontiguousarray(picture[:rows, :columns, ::-1]))

@@ -23,7 +23,7 @@ def write_overlay(
     every = max(1, len(track.frame) // LONGEST_MOVIE)
     zoom = _zoom(frames.shape)
     size = (frames.shape[1] * zoom // 2 * 2, frames.shape[0] * zoom // 2 * 2)
-    movie = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 15.0, size)
+    movie = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 15.0, size)
     if not movie.isOpened():
         raise MeasurementError(path, "overlay", "cannot be written: OpenCV has no MP4 encoder here")
     for i, picture in _draw(frames, track, column, surface_row, zoom):

@@ -138,7 +138,7 @@ def _invert(fisher: FloatArray) -> FloatArray:
     return inverse / both
 
 
-def cut_region(picture, background, usable, top, left, h, w):  # type: ignore[no-untyped-def]
+def cut_region(picture, background, usable, top, left, h, w):
     """The part of the region inside the picture, with the slices of the template that belong to it."""
     rows = slice(max(0, -top), min(h, picture.shape[0] - top))
     columns = slice(max(0, -left), min(w, picture.shape[1] - left))

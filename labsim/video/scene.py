@@ -77,7 +77,8 @@ def survey_scene(frames: Frames, progress: Callable[[int, int, str], None] | Non
     """Two passes over the video: what moves, then the background behind it. Raises MeasurementError."""
     path = frames.path
     low = high = first = previous = None
-    brightness, sparse, duplicate, highest, peak = [], [], [], [], 0
+    sparse: list[np.ndarray] = []
+    brightness, duplicate, highest, peak = [], [], [], 0
     step = max(1, int(np.sqrt(frames.shape[0] * frames.shape[1] / SPARSE)))
     for i, picture in enumerate(frames):
         small = picture[::step, ::step].astype(np.float32)

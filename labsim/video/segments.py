@@ -132,7 +132,7 @@ def design_motion(
     s = np.where(before, t - t0, 0.0)
     e = np.where(after, t - te, 0.0)
     integrals = _integrate_legendre((t[inside] - t0) / span, degree, orders)
-    columns = [
+    columns: list[FloatArray] = [
         np.zeros((degree + 3 + {"rebound": 1, "bounce": 2}.get(ending, 0), len(t))) for _ in range(orders)
     ]
     z = columns[0]

@@ -52,15 +52,15 @@ def find_surface(
         ys.append(edge - 4 + k + (profile[k] - 0.5) / (profile[k] - profile[k + 1]))
     if len(xs) < 12:
         return None, 0.0
-    x, y = np.array(xs, float), np.array(ys)
-    keep = np.ones(len(x), bool)
+    across, y = np.array(xs, dtype=float), np.array(ys, dtype=float)
+    keep = np.ones(across.shape, dtype=bool)
     for _ in range(4):
-        slope, offset = np.polyfit(x[keep], y[keep], 1)
-        misfit = y - slope * x - offset
+        slope, offset = np.polyfit(across[keep], y[keep], 1)
+        misfit = y - slope * across - offset
         keep = np.abs(misfit - np.median(misfit)) < 3.5 * max(1.4826 * np.median(np.abs(misfit)), 0.05)
     if float(np.std(misfit[keep])) > ROUGHEST_SURFACE:
         return None, 0.0
-    sigma = _doubt_line(x[keep], misfit[keep], (left, right))
+    sigma = _doubt_line(across[keep], misfit[keep], (left, right))
     return (float(offset), float(slope)), max(sigma, LEAST_SIGMA)
 
 

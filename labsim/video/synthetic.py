@@ -251,12 +251,12 @@ def write_video(
     parameters = [cv2.VIDEOWRITER_PROP_IS_COLOR, 0 if codec == "FFV1" else 1]
     if codec == "MJPG":
         writer = cv2.VideoWriter(
-            str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter_fourcc(*codec), 30.0, (w, h)
+            str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter.fourcc(*codec), 30.0, (w, h)
         )
         writer.set(cv2.VIDEOWRITER_PROP_QUALITY, float(quality if quality is not None else 95))
     else:
         writer = cv2.VideoWriter(
-            str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*codec), 30.0, (w, h), parameters
+            str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), 30.0, (w, h), parameters
         )
     for picture in pictures:
         writer.write(picture if codec == "FFV1" else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))

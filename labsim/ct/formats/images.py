@@ -78,11 +78,7 @@ def read_rescale(file: Path) -> dict:
     if file.suffix.lower() not in (".tif", ".tiff"):
         return {}
     with tifffile.TiffFile(file) as tiff:
-        text = (
-            str(tiff.pages[0].tags["ImageDescription"].value)
-            if "ImageDescription" in tiff.pages[0].tags
-            else ""
-        )
+        text = tiff.pages.first.description
     found = {}
     for name in ("slope", "offset"):
         match = re.search(
@@ -112,7 +108,8 @@ def _list_slices(folder: Path) -> list[Path]:
         raise MeasurementError(
             folder, "scan.slices", "no image has a number at the end of its name; number the slices"
         )
-    slices = sorted(max(numbered.values(), key=len))
+    longest = max(len(series) for series in numbered.values())
+    slices = sorted(next(series for series in numbered.values() if len(series) == longest))
     if len(slices) < 8:
         raise MeasurementError(folder, "scan.slices", f"only {len(slices)} slices; a scan needs 8 or more")
     numbers = np.array([number for number, _ in slices])

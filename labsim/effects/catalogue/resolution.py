@@ -35,7 +35,7 @@ leaves = (
     "press only a few particles; compare numerical_error in diagnosis.json."
 )
 references = ("Richardson extrapolation; docs/numerics.md for the measured order",)
-expect = {}  # the sign is the scheme's and changes with speed
+expect: dict[str, int] = {}  # the sign is the scheme's and changes with speed
 
 
 def change_setting(setting, values, place):

@@ -107,7 +107,7 @@ def _open_file(path: Path) -> Frames:
     )
 
 
-def _read_tags(file, start: int, end: int, count: int) -> tuple[np.ndarray | None, float]:  # type: ignore[no-untyped-def]
+def _read_tags(file, start: int, end: int, count: int) -> tuple[np.ndarray | None, float]:
     """Times (s, since the first second) and the exposure (s) from the tagged blocks."""
     stamps, exposure, at = None, 0.0, start
     while at + 8 <= end:

@@ -73,7 +73,7 @@ def read_picture(path: Path) -> np.ndarray:
                 pass
         content = np.fromfile(path, np.uint8)
         if path.suffix.lower() == ".png":
-            with Image.open(io.BytesIO(content)) as picture_file:
+            with Image.open(io.BytesIO(content.tobytes())) as picture_file:
                 picture_file.verify()  # its checksums: libpng has words of its own for a damaged one
         picture = cv2.imdecode(content, cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE)
     except MeasurementError:
