@@ -45,6 +45,7 @@ from .pairs import confirm_pairs, return_to_singles, settle_leading
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unknown import UnknownFit, fit_unknown
+from .untestable import Combination, Untestable, find_combination, list_untestable
 
 HALF = 0.5  # of the best gain, if that is less than CLOSE asks: large effects are not what screening or fingerprints say
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
@@ -82,9 +83,14 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Diagnosis(Judgement):
-    """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa."""
+    """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa.
+
+    untestable : beside what was found; combination : what is measured although they may be there.
+    """
 
     confusable: list[tuple[str, str, float]]
+    untestable: list[Untestable]
+    combination: Combination | None
     held_out_nominal: HeldOut
     held_out_extended: HeldOut
     gain: Gain
@@ -243,6 +249,8 @@ def diagnose_campaign(
     averaged = average_p_m(
         found.verdict, nominal, found.rivals, campaign.p_m_range, sampled=sampled, seed=seed
     )
+    about = best if found.verdict.word == "effect" else nominal
+    untestable = list_untestable(bench, about)
     doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
     if best is not nominal:
         doubts += [f"with {' + '.join(best.hypothesis)}: {text}" for text in warn_of_range(bench, best)]
@@ -250,6 +258,8 @@ def diagnose_campaign(
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},
         confusable=list_confusable(found.screening),
+        untestable=untestable,
+        combination=find_combination(bench, about, untestable),
         held_out_nominal=held_nominal,
         held_out_extended=held_best,
         gain=measure_gain(held_nominal, held_best),

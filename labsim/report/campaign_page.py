@@ -15,7 +15,7 @@ from ..inference.workbench import Workbench
 from ..records import Campaign
 from .campaign_tables import say_verdict
 from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
-from .cause_words import BADGES, describe_causes, describe_gain, list_confusable
+from .cause_words import BADGES, describe_causes, describe_gain, describe_untestable, list_confusable
 from .drop_views import DropView
 from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
 from .law_figures import plot_law
@@ -108,6 +108,7 @@ def write_campaign_page(
         causes=causes,
         laws=laws,
         confusable=confusable,
+        untestable=describe_untestable(found),
         gain=describe_gain(found, summary, labels),
         suggestions=suggestions,
         numerics=describe_numerics(summary["numerical_error"], found.bench),

@@ -25,6 +25,8 @@ NUMERICAL_DEPTH = (
     0.0033  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
 )
 
+MOST_SAID = 3  # causes that are not testable, on one line
+
 
 def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
     """calibration.json."""
@@ -127,6 +129,16 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "causes": causes,
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
+        "not_testable": [
+            {"cause": each.name, "trace_sigma": each.trace, "p_m_Pa": list(each.p_m)}
+            for each in found.untestable
+        ],
+        "well_determined": found.combination
+        and {
+            "expression": found.combination.expression,
+            "value": found.combination.value,
+            "sigma": found.combination.value * found.combination.sigma,
+        },
         "p_m_Pa": {
             "nominal": summarise(found.posterior_nominal.samples("p_m_Pa")),
             "extended": summarise(found.posterior_extended.samples("p_m_Pa")),
@@ -241,12 +253,31 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     )
     for first, second, cosine in found.confusable[:4]:
         lines.append(f"  hard to tell apart here: {first} and {second} (cosine {cosine:+.2f})")
+    lines += _say_untestable(found)
     if suggestions:
         lines.append(
             f"  next experiment: {suggestions[0].change} ({suggestions[0].information_bits:.2f} bits)"
         )
     lines.append(f"  {found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s")
     return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings[found.doubts :])])
+
+
+def _say_untestable(found: Diagnosis) -> list[str]:
+    """Causes that could be there unseen, where they would move p_m by more than its error; and what holds all the same."""
+    if found.combination is None:
+        return []
+    sigma = found.combination.sigma
+    moving = [each for each in found.untestable if each.width > sigma]
+    named = [
+        f"{each.name} (p_m would be {each.p_m[0] / 1e3:.3g} to {each.p_m[1] / 1e3:.3g} kPa)"
+        for each in moving[:MOST_SAID]
+    ]
+    more = f", and {len(moving) - MOST_SAID} more" if len(moving) > MOST_SAID else ""
+    value = found.combination.value / 1e3
+    return [
+        f"  not testable here: {', '.join(named)}{more}",
+        f"  what holds all the same: {found.combination.expression} = {value:.3g} ± {value * sigma:.2g} kPa",
+    ]
 
 
 def extended_model(found: Diagnosis) -> Model:

@@ -82,6 +82,29 @@ def list_confusable(found: Diagnosis) -> list[tuple[str, str, str, str]]:
     ]
 
 
+def describe_untestable(found: Diagnosis) -> dict[str, Any] | None:
+    """What could be there unseen, and the p_m that it would imply; None where everything is testable."""
+    if not found.untestable:
+        return None
+    words = (
+        "These causes may be there unseen: with one standard deviation of its prior each leaves less than two standard "
+        "deviations of the data, and p_m takes its place. The last column is the p_m of dust with so much of it, on either side."
+    )
+    if found.combination is not None:
+        value, sigma = found.combination.value / 1e3, found.combination.value * found.combination.sigma / 1e3
+        words += f" Measured all the same: {found.combination.expression} = {value:.3g} ± {sigma:.2g} kPa."
+    rows = [
+        (
+            each.name,
+            _title(found, [each.name]),
+            f"{each.trace:.1f}",
+            "{:.3g} to {:.3g}".format(*(p / 1e3 for p in each.p_m)),
+        )
+        for each in found.untestable
+    ]
+    return {"words": words, "rows": rows}
+
+
 def describe_gain(found: Diagnosis, summary: dict, labels: Sequence[str]) -> dict[str, Any]:
     gain = summary["gain"]
     nominal, extended, noise = (

@@ -57,7 +57,7 @@ def none(place: Path) -> Path:
 def unknown(place: Path) -> Path:
     """Every other drop 8 % deeper than the law, the others 8 % shallower; with a scan, which enters the likelihood, and a second
     one that is left out."""
-    folder = laws.write_campaign(place / "campaign-unknown", odd=0.08, scan=True)
+    folder = laws.write_campaign(place / "campaign-unknown", bent=0.05, scan=True)
     campaign = read_campaign(folder)
     found = diagnose_campaign(campaign, laws.LawStore(place / "store"), workers=1, use_scans=True)
     lost = dataclasses.replace(campaign.scans[0], name="C02", slices=folder / "nowhere")

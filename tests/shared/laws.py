@@ -91,19 +91,18 @@ def write_campaign(
     *,
     drops: list[tuple[float, float, float]] = DROPS,
     rate: float = 0.0,
-    odd: float = 0.0,
+    bent: float = 0.0,
     name: str = "made up",
     description: str = "drops that obey a law",
     scan: bool = False,
 ) -> Path:
-    """rate: strength_rate of the truth. odd: relative change of the depth, up and down from drop to drop."""
+    """rate: strength_rate of the truth. bent: share of the depth by which all drops run ahead half way."""
     rng = np.random.default_rng(7)
     folder.mkdir(parents=True)
     text = fill_in(CAMPAIGN, name=name, description=description)
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
     for number, (radius, mass, speed) in enumerate(drops, start=1):
-        change = 1 + odd * (-1) ** number
-        depth, stop = move(radius * 1e-3, mass * 1e-6, speed, 1300.0 / change**2, rate)
+        depth, stop = move(radius * 1e-3, mass * 1e-6, speed, 1300.0, rate)
         at = folder / "drops" / f"D{number:02d}"
         at.mkdir(parents=True)
         height = speed**2 / 2 / 9.81
@@ -125,7 +124,8 @@ def write_campaign(
         (at / "drop.toml").write_text(text)
         frame = np.arange(int((0.004 + 1.6 * stop) * RATE))
         clock = frame / RATE - 0.00403
-        inside = depth * np.sin(np.clip(clock / stop, 0, 1) * math.pi / 2)
+        phase = np.clip(clock / stop, 0, 1) * math.pi / 2
+        inside = depth * (np.sin(phase) + bent * np.sin(2 * phase) ** 2)
         place = np.where(clock < 0, speed * clock + 0.5 * 9.81 * clock**2, inside)
         row = SURFACE + place / PIXEL + rng.normal(0, NOISE, frame.size)
         table = "".join(f"{k},{value:.4f}\n" for k, value in zip(frame, row, strict=True))

@@ -1,0 +1,100 @@
+"""Causes that a campaign could not see were they there, and the p_m that each of them would imply.
+
+An effect of the size that its prior expects, one standard deviation, changes the data by ``trace`` standard deviations of their
+errors once ln p_m and what is fitted beside it have followed. What leaves less than SEEN passes for nothing, and p_m takes its
+place. All to first order about one fit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..inference.fitting import Fit, with_probes
+from ..inference.workbench import Workbench
+from .screen import has_runs
+
+SEEN = 2.0  # standard deviations that a trace has to leave: the score of one effect exceeds that by chance one time in twenty
+CHANGES = 0.01  # of ln p_m: what moves it by less is not worth a line
+
+
+@dataclass(frozen=True)
+class Untestable:
+    """One cause, with an amplitude of one standard deviation of its prior.
+
+    trace : what it leaves, in standard deviations of the data's errors; traded : ln p_m that a unit of amplitude takes from the
+    dust; p_m : lowest and highest, Pa, were it there on either side of null, as far as its limits go.
+    """
+
+    name: str
+    trace: float
+    traded: float
+    p_m: tuple[float, float]
+
+    @property
+    def width(self) -> float:
+        """ln of highest over lowest p_m."""
+        return math.log(self.p_m[1] / self.p_m[0])
+
+
+@dataclass(frozen=True)
+class Combination:
+    """What is measured although p_m alone is not. expression : in words of parameters; value : Pa; sigma : of its ln."""
+
+    expression: str
+    value: float
+    sigma: float
+
+
+def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
+    """Every effect beside those of the fit that leaves less than SEEN and moves p_m, that with the widest p_m first."""
+    names = [
+        name
+        for name, effect in bench.effects.items()
+        if effect.amplitudes and name not in fit.hypothesis and effect.kind != "numerics"
+    ]
+    names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
+    linear = with_probes(bench, fit, names)
+    known = ["ln_p_m", *fit.hypothesis]
+    tangents = np.concatenate(
+        [
+            block.whiten(np.stack([block.tangents[name] for name in [*known, *names]], axis=1))
+            for block in linear.blocks
+        ]
+    )
+    scales = np.array([bench.effects[name].amplitudes[0].scale for name in fit.hypothesis])
+    priors = np.hstack(
+        [np.zeros((len(scales), 1)), np.diag(1.0 / scales), np.zeros((len(scales), len(names)))]
+    )
+    rows = np.vstack([tangents, priors])
+    followed = np.linalg.lstsq(rows[:, : len(known)], rows[:, len(known) :], rcond=None)[0]
+    left = np.linalg.norm(rows[:, len(known) :] - rows[:, : len(known)] @ followed, axis=0)
+    found = []
+    for name, length, traded in zip(names, left, followed[0], strict=True):
+        parameter = bench.effects[name].amplitudes[0]
+        ends = [parameter.hold(side * parameter.scale) - parameter.null for side in (-1.0, 0.0, 1.0)]
+        implied = np.clip(np.exp(fit.log_p_m - traded * np.array(ends)), *bench.campaign.p_m_range)
+        each = Untestable(
+            name,
+            float(length * parameter.scale),
+            float(traded),
+            (float(implied.min()), float(implied.max())),
+        )
+        if each.trace < SEEN and each.width > CHANGES:
+            found.append(each)
+    return sorted(found, key=lambda each: -each.width)
+
+
+def find_combination(bench: Workbench, fit: Fit, untestable: list[Untestable]) -> Combination | None:
+    """p_m with what the first of the untestable causes takes; None where none moves p_m by more than its standard deviation."""
+    sigma = math.sqrt(fit.covariance[0, 0])
+    if not untestable or untestable[0].width < sigma:
+        return None
+    name, power = untestable[0].name, untestable[0].traded
+    parameter = bench.effects[name].amplitudes[0]
+    full = f"{name}.{parameter.name}"
+    # about a null of one the amplitude is the ln of a factor
+    factor = f"{full}^{power:.2f}" if parameter.null == 1.0 else f"exp({power:.3g} * {full})"
+    return Combination(f"p_m * {factor}", math.exp(fit.log_p_m), sigma)

@@ -1,0 +1,62 @@
+"""What a campaign cannot test is said, with the p_m that it would imply: drops that obey a law in closed form."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from laws import LawStore, write_campaign
+
+from labsim.campaign import read_campaign
+from labsim.diagnosis.screen import screen
+from labsim.diagnosis.untestable import find_combination, list_untestable
+from labsim.inference.calibrate import prepare
+from labsim.inference.fitting import Fit, fit_hypothesis
+from labsim.inference.workbench import Workbench
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory) -> tuple[Workbench, Fit]:
+    campaign = read_campaign(write_campaign(tmp_path_factory.mktemp("untestable") / "made"))
+    bench, fit = prepare(campaign, LawStore(tmp_path_factory.mktemp("store")), workers=1)
+    screen(bench, fit, np.random.default_rng(1))  # asks for the runs of every effect
+    return bench, fit
+
+
+def test_what_takes_the_place_of_p_m_is_said_to(opened):
+    """Strength goes as p_m f^0.3 φ^4 here, depth as √(mass / strength): no drop tells f, φ or mass from p_m."""
+    bench, fit = opened
+    found = {each.name: each for each in list_untestable(bench, fit)}
+    assert set(found) == {"shear_strength", "filling_factor", "projectile_mass"}
+    shear = found["shear_strength"]
+    secant = -math.log(0.75**0.3) / 0.25  # the screening's runs are made at f = 0.75
+    assert shear.traded == pytest.approx(secant, rel=0.02)
+    assert found["filling_factor"].traded == pytest.approx(4 / 0.15, rel=0.02)
+    assert found["projectile_mass"].traded == pytest.approx(-1.0, rel=0.02)
+    assert all(each.trace < 1.0 for each in found.values())  # of 1 % by which a secant is no tangent
+    scale = bench.effects["shear_strength"].amplitudes[0].scale
+    assert shear.width == pytest.approx(2 * shear.traded * scale, rel=1e-6)
+    assert shear.p_m[0] < math.exp(fit.log_p_m) < shear.p_m[1]
+
+
+def test_what_is_measured_all_the_same(opened):
+    bench, fit = opened
+    untestable = list_untestable(bench, fit)
+    first = next(each for each in untestable if each.name == "shear_strength")
+    held = find_combination(bench, fit, [first])
+    assert held is not None
+    assert held.expression == f"p_m * shear_strength.factor^{first.traded:.2f}"
+    assert held.value == pytest.approx(math.exp(fit.log_p_m))
+    assert find_combination(bench, fit, []) is None
+    assert find_combination(bench, fit, [replace(first, p_m=(999.0, 1000.0))]) is None
+
+
+def test_about_a_cause_that_is_fitted_it_follows_too(opened):
+    """The fitted cause itself is not listed; p_m and its amplitude together leave of the others no more than p_m alone."""
+    bench, fit = opened
+    rate = fit_hypothesis(bench, ("strength_rate",), (fit.log_p_m, {"strength_rate": 0.0}), nuisances=fit)
+    found = {each.name: each for each in list_untestable(bench, rate)}
+    assert "strength_rate" not in found
+    before = {each.name: each for each in list_untestable(bench, fit)}
+    assert set(found) >= set(before)
+    assert found["shear_strength"].trace < 1.1 * before["shear_strength"].trace
