@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .campaign_scans import read_scan
+from .campaign_strength import read_strength_tests
 from .campaign_tables import (
     find_toml,
     list_parts,
@@ -92,6 +93,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         published_scans=tuple(scan for scan in read_scans if isinstance(scan, PublishedScan)),
         planar=planar,
         source=source,
+        strength_tests=read_strength_tests(folder, sample),
     )
 
 
@@ -170,6 +172,8 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         f"  {_count(campaign.scans, 'CT scan')} with slices, "
         f"{_count(campaign.published_scans, 'published compaction figure')}",
     ]  # fmt: skip
+    if campaign.strength_tests:
+        lines.append(f"  {_count(campaign.strength_tests, 'static strength test')}")
     if assumed:
         lines.append(
             f"  {len(assumed)} drops rest on assumed figures; each drop.toml says which and why under [source]"
@@ -180,6 +184,7 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         "kinds": kinds,
         "scans": len(campaign.scans),
         "published_scans": len(campaign.published_scans),
+        "strength_tests": len(campaign.strength_tests),
         "tip_radii_m": radii,
         "assumed": assumed,
         "warnings": [],

@@ -189,6 +189,19 @@ class Planar:
     box_radius: float = 0.55e-3  # m, the radius that the box belongs to
 
 
+STRENGTH_KINDS = ("compression_omnidirectional", "compression_unidirectional", "tension", "shear")
+
+
+@dataclass(frozen=True)
+class StrengthTest:
+    """One static test of the dust. points : (filling factor, stress in Pa) of each row; relative_sigma : of the stress."""
+
+    name: str
+    kind: Literal["compression_omnidirectional", "compression_unidirectional", "tension", "shear"]
+    points: tuple[tuple[float, float], ...]
+    relative_sigma: float
+
+
 @dataclass(frozen=True)
 class Campaign:
     """One series of drops into one kind of sample, as read from its folder (campaign.read_campaign)."""
@@ -207,6 +220,7 @@ class Campaign:
     planar: Planar = Planar()
     source: dict = field(default_factory=dict)  # campaign.toml [source] as written
     calibrated: str = "p_m"  # the parameter of the law that p_m_range is the range of
+    strength_tests: tuple[StrengthTest, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def check(
 
     with options.show_progress(quiet or as_json or not sys.stderr.isatty()) as progress:
         seen = inspect_campaign(read, progress)
-    found, troubles, odd = [*seen.drops, *seen.scans], seen.troubles, seen.all_odd
+    found, troubles, odd = seen.parts, seen.troubles, seen.all_odd
     wide = max((len(each.name) for each in found), default=0)
     summary = describe_campaign(read)
     lines = [summary["text"], "there:", *(f"  {each.name:{wide}}  {each.line}" for each in found)]

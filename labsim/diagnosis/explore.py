@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ExtrapolationError
+from ..inference.blocks import solve_globals
 from ..inference.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, goodness_of_fit, with_probes
-from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from .screen import Screening
 from .shapes import cause
@@ -85,7 +85,7 @@ def _start_at(bench: Workbench, nominal: Fit, name: str, log_p_m: float) -> floa
     """Amplitude that the data ask for at a strength, by the tangent there, within two of its steps."""
     parameter = bench.effects[name].amplitudes[0]
     bench.require_about(name, log_p_m)
-    linear = with_probes(bench, nominal, [name], log_p_m)
-    step, *_ = solve_globals(linear.blocks, [name], {name: (0.0, parameter.scale)})
+    blocks = with_probes(bench, nominal, [name], log_p_m)
+    step, *_ = solve_globals(blocks, [name], {name: (0.0, parameter.scale)})
     reach = 2 * abs(parameter.step)
     return float(np.clip(step[0], -reach, reach))

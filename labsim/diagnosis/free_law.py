@@ -17,10 +17,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import truncnorm
 
-from ..inference.blocks import Block
+from ..inference.blocks import Block, solve_globals
 from ..inference.evidence import log_share_inside
 from ..inference.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
-from ..inference.likelihood import solve_globals
 from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
 from ..inference.steps import move_nuisances
 from ..inference.tangents import linearise_at
@@ -131,13 +130,13 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         for law in laws
     )
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    models, speeds, log_p_m = [replace(model) for model in fit.models], list(fit.scan_speeds), fit.log_p_m
+    nuisances, log_p_m = fit.nuisances, fit.log_p_m
     values = dict.fromkeys(names, 0.0)
     for rounds in range(ROUNDS + 1):
         bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range))
-        linear = linearise_at(free, models, speeds, log_p_m, {**fit.values, **values})
-        gram, log_determinant, points = gather(linear.blocks, names, scales, values)
-        drops = np.stack([linear.tangents[name] * scales[name] for name in names], axis=1)
+        blocks = linearise_at(free, nuisances, log_p_m, {**fit.values, **values})
+        gram, log_determinant, points = gather(blocks, names, scales, values)
+        drops = np.stack([blocks[0].tangents[name] * scales[name] for name in names], axis=1)
         found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops, log_p_m)
         if rounds == ROUNDS:
             break
@@ -146,7 +145,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
             key=lambda each: integrate(found, each[0], each[1], (low, high)).evidence,
         )
         priors = {name: (values[name], size * scales[name]) for name in own}
-        step, covariance, _, _, weighted = solve_globals(linear.blocks, ["ln_p_m", *own], priors)
+        step, covariance, _, _, weighted = solve_globals(blocks, ["ln_p_m", *own], priors)
         before, log_p_m = log_p_m, float(np.clip(log_p_m + np.clip(step[0], -0.7, 0.7), low, high))
         # the others' best where p_m stops short of its own
         step += covariance[0] / covariance[0, 0] * (log_p_m - before - step[0])
@@ -161,7 +160,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
         nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], coarse=True)]
         free.require_changes(nodes, "free law, large")
-        move_nuisances(bench, models, speeds, linear, weighted)
+        nuisances, _ = move_nuisances(bench, nuisances, blocks, weighted)
     return found
 
 

@@ -62,7 +62,7 @@ class _HeldDrop:
 
 def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop], FloatArray, FloatArray]:
     """Every drop held out; what scans and priors say of the globals: pull (k,) and precision (k, k)."""
-    linear = fit.linear
+    linear = fit.drops
     names = [] if known else ["ln_p_m", *fit.hypothesis]
     design = _stack(linear.tangents, names, linear.residual.size)
     precision = np.zeros((len(names), len(names)))
@@ -71,13 +71,13 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
         width = bench.effects[name].amplitudes[0].scale
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
-    for block in linear.further:  # scans are never held out
+    for block in fit.blocks[1:]:  # only drops are held out
         columns = _stack(block.tangents, names, block.residual.size)
         solved = block.solve(columns)
         precision += columns.T @ solved
         pull += solved.T @ block.residual
     drops = []
-    for model in fit.models:
+    for model in bench.tracks.models:
         section = linear.sections[model.observed.name]
         data = model.matrix @ model.observed.depth
         below = np.zeros(section.stop - section.start, dtype=bool)
@@ -101,14 +101,14 @@ def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> Held
 
     A single drop leaves nothing to predict it from: its figures are NaN. known : the globals are held where the fit has them.
     """
-    names = tuple(model.observed.name for model in fit.models)
-    if len(fit.models) < 2:
+    names = tuple(model.observed.name for model in bench.tracks.models)
+    if len(names) < 2:
         nothing = np.full(1, math.nan)
         return HeldOut(names, nothing, nothing, nothing, np.ones(1))
     rms, expected, score, count = [], [], [], []
     drops, pull, _precision = _hold_out(bench, fit, known)
     for drop in drops:
-        error = drop.miss(fit.linear.residual, pull)
+        error = drop.miss(fit.drops.residual, pull)
         lower = np.linalg.cholesky(drop.spread)
         white = np.linalg.solve(lower, error)
         score.append(
@@ -126,14 +126,14 @@ def check_prediction(bench: Workbench, fit: Fit, random: np.random.Generator, dr
     A fault that is smooth along the way is a few directions among hundreds of data, where χ² does not show it; what one drop
     says of another is few numbers. Its null law is drawn: data of the fitted model's own covariance. 1 with a single drop.
     """
-    if len(fit.models) < 2:
+    if len(bench.tracks.models) < 2:
         return 1.0
     drops, pull, precision = _hold_out(bench, fit, known=False)
-    lower = np.tril(fit.linear.drops.lower)
+    lower = np.tril(fit.drops.lower)
     residuals = lower @ random.standard_normal((len(lower), draws))
     values, axes = np.linalg.eigh(precision)
     pulls = axes * np.sqrt(np.maximum(values, 0.0)) @ random.standard_normal((len(values), draws))
-    seen = sum(float(np.sum(drop.miss(fit.linear.residual, pull) ** 2)) for drop in drops)
+    seen = sum(float(np.sum(drop.miss(fit.drops.residual, pull) ** 2)) for drop in drops)
     drawn = sum(np.sum(drop.miss(residuals, pulls) ** 2, axis=0) for drop in drops)
     return float((1 + np.count_nonzero(drawn >= seen)) / (1 + draws))
 

@@ -17,6 +17,8 @@ import numpy as np
 from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
 from ..inference.fitting import Fit
+from ..inference.scans import CompactedZone
+from ..inference.tracks import Tracks
 from ..inference.workbench import Workbench
 from ..records import Campaign
 from ..sph import DropSetting
@@ -61,12 +63,16 @@ class FreeLaw:
 def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
     """The three laws with the hats that these drops and scans reach."""
     deepest, fastest = 0.0, 0.0
-    for model in fit.models:
-        deepest = max(deepest, float(np.max(model.observed.depth)) / model.radius)
-        fastest = max(fastest, math.exp(model.instant.log_speed))
-    for scan, log_speed in zip(bench.scans, fit.scan_speeds, strict=True):
-        deepest = max(deepest, scan.observed.reduced.map.tip_depth / scan.observed.radius)
-        fastest = max(fastest, math.exp(log_speed))
+    for observation, nuisances in zip(bench.observations, fit.nuisances, strict=True):
+        if isinstance(observation, Tracks):
+            instants = observation.instants(nuisances)
+            fastest = max([fastest, *(math.exp(instant.log_speed) for instant in instants)])
+            depths = (float(np.max(model.observed.depth)) / model.radius for model in observation.models)
+            deepest = max([deepest, *depths])
+        elif isinstance(observation, CompactedZone):
+            observed = observation.observed
+            deepest = max(deepest, observed.reduced.map.tip_depth / observed.radius)
+            fastest = max(fastest, math.exp(float(nuisances[0])))
     material, level = bench.campaign.material, bench.campaign.sample.filling_factor
     dust = tuple(round(level + more, 6) for more in COMPACTION if level + more < material.phi_2)
     at_rest = (0.0, *SPEEDS)

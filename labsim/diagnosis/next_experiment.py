@@ -73,7 +73,7 @@ def _predict(bench: Workbench, fit: Fit, number: int, speed: float, shift: float
 
     shift : of ln p_m from the fit's.
     """
-    code = bench.tables[number].code(fit.log_p_m + shift, math.log(speed), fit.values)
+    code = bench.tracks.features[number].table.code(fit.log_p_m + shift, math.log(speed), fit.values)
     instrument = next(iter(bench.instruments(fit.values).values()))
     depth, stop = math.exp(code[0]), math.exp(code[1])
     shape = np.interp(POINTS, FRACTIONS, code[2:])
@@ -84,7 +84,7 @@ def _spread(bench: Workbench, fits: list[Fit], number: int, speed: float, mean: 
     """Covariance of such a measurement: localisation, sample scatter, numerical error, uncertainty of p_m."""
     base, moved = (_predict(bench, fits[0], number, speed, shift) for shift in (0.0, 0.01))
     tangent = (moved - base) / 0.01
-    white = np.median([model.observed.sigma for model in bench.models])
+    white = np.median([model.observed.sigma for model in bench.tracks.models])
     variance = bench.terms.scatter**2 + fits[0].covariance[0, 0]
     numerical = bench.terms.numerical * mean
     return (

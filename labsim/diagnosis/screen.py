@@ -70,13 +70,13 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     ]
     bench.require_changes(wanted, "fingerprints", coarse=True)
     names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
-    linear = with_probes(bench, fit, names)
+    blocks = with_probes(bench, fit, names)
     whitened = np.concatenate(
         [
             block.whiten(
                 np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1)
             )
-            for block in linear.blocks
+            for block in blocks
         ]
     )
     sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))
@@ -156,10 +156,12 @@ def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str
 
 def has_runs(bench: Workbench, name: str) -> bool:
     """Whether an effect's runs gave every projectile something to compare."""
-    tables = [*bench.tables, *(scan.table for scan in bench.scans)]
     return all(
-        any(entry for entry in (table.changes.get(name) or table.fingerprints.get(name, {})).values())
-        for table in tables
+        any(
+            entry
+            for entry in (each.table.changes.get(name) or each.table.fingerprints.get(name, {})).values()
+        )
+        for each in bench.features
     )
 
 

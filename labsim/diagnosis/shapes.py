@@ -15,9 +15,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..effects import Effect, Parameter
+from ..inference.blocks import solve_globals
 from ..inference.fitting import Fit
-from ..inference.likelihood import solve_globals
-from ..inference.tangents import linearise_dust
+from ..inference.tangents import linearise_alone
+from ..inference.undisturbed import Layering
 from ..inference.workbench import Workbench
 from .screen import Screening
 
@@ -58,23 +59,30 @@ def cause(name: str) -> str:
 
 
 def _shows_in_dust(bench: Workbench, name: str) -> bool:
-    blocks = linearise_dust(bench, {}, {name: bench.effects[name].amplitudes[0].step})
-    return any(bool(np.any(block.tangents[name] != 0.0)) for block in blocks)
+    dust = _find_dust(bench)
+    if dust is None:
+        return False
+    block = linearise_alone(bench, dust, {}, {name: bench.effects[name].amplitudes[0].step})
+    return bool(np.any(block.tangents[name] != 0.0))
+
+
+def _find_dust(bench: Workbench) -> Layering | None:
+    return next((each for each in bench.observations if isinstance(each, Layering)), None)
 
 
 def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
     """Best shape by the undisturbed dust alone, with its amplitude free; its prior's price goes to shape_evidence."""
-    effect = bench.effects[name]
+    effect, dust = bench.effects[name], _find_dust(bench)
+    assert dust is not None
     width = effect.amplitudes[0].scale
 
     def cost(log_shape: float) -> float:
         bench.effects[name] = with_shape(effect, math.exp(log_shape))
-        block = linearise_dust(bench, {}, {name: 0.05 * effect.amplitudes[0].step})[0]
+        block = linearise_alone(bench, dust, {}, {name: 0.05 * effect.amplitudes[0].step})
         _step, _cov, chi, _det, _w = solve_globals([block], [name], {name: (0.0, width)})
         return chi - 2 * float(parameter.log_prior(math.exp(log_shape)))
 
-    block = linearise_dust(bench, {}, {})[0]
-    plain = block.chi_square
+    plain = linearise_alone(bench, dust, {}, {}).chi_square
     low, high = (math.log(max(limit, 1e-12)) for limit in parameter.limits)
     grid = np.linspace(low, high, 25)[1:-1]
     values = [cost(x) for x in grid]
@@ -163,8 +171,8 @@ def _evidence(
 
 def _take_name(bench: Workbench, variant: str, base: str) -> None:
     bench.effects[base] = bench.effects[variant]
-    for table in [*bench.tables, *(scan.table for scan in bench.scans)]:
-        for kept in (table.changes, table.fingerprints):
+    for each in bench.features:
+        for kept in (each.table.changes, each.table.fingerprints):
             kept.pop(base, None)
             if variant in kept:
                 kept[base] = kept.pop(variant)
@@ -175,12 +183,5 @@ def _rename(fit: Fit, before: str, after: str) -> Fit:
     def rename(table: Mapping) -> dict:
         return {after if key == before else key: value for key, value in table.items()}
 
-    linear = replace(
-        fit.linear,
-        tangents=rename(fit.linear.tangents),
-        scans=tuple(replace(block, tangents=rename(block.tangents)) for block in fit.linear.scans),
-        undisturbed=tuple(
-            replace(block, tangents=rename(block.tangents)) for block in fit.linear.undisturbed
-        ),
-    )
-    return replace(fit, hypothesis=(after,), values=rename(fit.values), linear=linear)
+    blocks = tuple(replace(block, tangents=rename(block.tangents)) for block in fit.blocks)
+    return replace(fit, hypothesis=(after,), values=rename(fit.values), blocks=blocks)

@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..inference.blocks import Block
+from ..inference.blocks import Block, solve_globals
 from ..inference.evidence import log_share_inside
 from ..inference.fitting import Fit
-from ..inference.likelihood import solve_globals
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
@@ -27,21 +26,23 @@ SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth
 MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map, or the undisturbed dust, by 3 %
 
 
+DUST = "undisturbed dust"
+
+
 @dataclass(frozen=True)
 class Freedom:
     """What may deviate. scales : of the law over (fraction of the way, ln speed, ln size), None where drops may not deviate;
-    in_maps, in_dust : whether the compacted zone and the undisturbed dust may."""
+    kinds : of the other observations that may."""
 
     scales: tuple[float, float, float] | None
-    in_maps: bool = True
-    in_dust: bool = False
+    kinds: frozenset[str]
 
 
 FREEDOMS = {
-    "depth and speed": Freedom((0.35, 0.5, 0.5)),
-    "drop": Freedom((1.0, 1e-3, 1e-3)),
-    "undisturbed dust": Freedom(None, in_maps=False, in_dust=True),
-    "depth and speed and undisturbed dust": Freedom((0.35, 0.5, 0.5), in_dust=True),
+    "depth and speed": Freedom((0.35, 0.5, 0.5), frozenset({"map"})),
+    "drop": Freedom((1.0, 1e-3, 1e-3), frozenset({"map"})),
+    "undisturbed dust": Freedom(None, frozenset({DUST})),
+    "depth and speed and undisturbed dust": Freedom((0.35, 0.5, 0.5), frozenset({"map", DUST})),
 }
 
 
@@ -67,20 +68,22 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
 
     tangents : of embedded laws, where those compete.
     """
-    linear = fit.linear
-    coordinates = law_coordinates(fit)
+    drops, kinds = fit.drops, [each.kind for each in bench.observations]
+    coordinates = law_coordinates(bench, fit)
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    n = sum(block.residual.size for block in linear.blocks)
+    n = sum(block.residual.size for block in fit.blocks)
     terms: dict[str, list[float]] = {}
     best: tuple[float, str, float, FloatArray] | None = None
     for name, freedom in FREEDOMS.items():
-        if freedom.in_dust and not linear.undisturbed:
+        if DUST in freedom.kinds and DUST not in kinds:
             continue
         shape = law_covariance(coordinates, freedom.scales) if freedom.scales else None
         for size in SIZES:
-            free = [loosen(Block(linear.residual, linear.covariance, linear.tangents, shape), size)]
-            free += [loosen(block, MAP_SHARE * size * freedom.in_maps) for block in linear.scans]
-            free += [loosen(block, MAP_SHARE * size * freedom.in_dust) for block in linear.undisturbed]
+            free = [loosen(Block(drops.residual, drops.covariance, drops.tangents, shape), size)]
+            free += [
+                loosen(block, MAP_SHARE * size * (kind in freedom.kinds))
+                for kind, block in zip(kinds[1:], fit.blocks[1:], strict=True)
+            ]
             step, variance, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
             evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
             evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(variance[0, 0]) - math.log(high - low)
@@ -88,7 +91,7 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
             evidence += log_share_inside(low, high, moved, math.sqrt(variance[0, 0]))
             terms.setdefault(name, []).append(evidence)
             if best is None or evidence > best[0]:
-                law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(linear.residual.size)
+                law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(drops.residual.size)
                 best = (evidence, name, size, law)
     embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
     for name, places in EMBEDDED.items():
@@ -128,7 +131,7 @@ def loosen(block: Block, size: float) -> Block:
     return replace(block, covariance=block.covariance + size**2 * block.free)
 
 
-def law_coordinates(fit: Fit) -> dict[str, FloatArray]:
+def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
     """Per datum: depth reached (m), fraction of the way, ln of speed² over radius, ln radius, ln mass per radius³."""
     parts: dict[str, list[FloatArray]] = {
         "reached": [],
@@ -137,8 +140,9 @@ def law_coordinates(fit: Fit) -> dict[str, FloatArray]:
         "radius": [],
         "mass": [],
     }
-    for model in fit.models:
-        section = fit.linear.sections[model.observed.name]
+    tracks = bench.tracks
+    for model, instant in zip(tracks.models, tracks.instants(fit.nuisances[0]), strict=True):
+        section = fit.drops.sections[model.observed.name]
         n = section.stop - section.start
         data = model.matrix @ model.observed.depth
         reached = np.zeros(n)
@@ -148,7 +152,7 @@ def law_coordinates(fit: Fit) -> dict[str, FloatArray]:
         parts["fraction"].append(reached / final)
         mass = model.observed.drop.projectile.mass
         for key, value in (
-            ("speed", model.instant.log_speed - 0.5 * math.log(model.radius)),
+            ("speed", instant.log_speed - 0.5 * math.log(model.radius)),
             ("radius", math.log(model.radius)),
             ("mass", math.log(mass / model.radius**3)),
         ):

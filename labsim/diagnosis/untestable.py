@@ -56,12 +56,12 @@ def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
         if effect.amplitudes and name not in fit.hypothesis and effect.kind != "numerics"
     ]
     names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
-    linear = with_probes(bench, fit, names)
+    blocks = with_probes(bench, fit, names)
     known = ["ln_p_m", *fit.hypothesis]
     tangents = np.concatenate(
         [
             block.whiten(np.stack([block.tangents[name] for name in [*known, *names]], axis=1))
-            for block in linear.blocks
+            for block in blocks
         ]
     )
     scales = np.array([bench.effects[name].amplitudes[0].scale for name in fit.hypothesis])
@@ -96,5 +96,6 @@ def find_combination(bench: Workbench, fit: Fit, untestable: list[Untestable]) -
     parameter = bench.effects[name].amplitudes[0]
     full = f"{name}.{parameter.name}"
     # about a null of one the amplitude is the ln of a factor
-    factor = f"{full}^{power:.2f}" if parameter.null == 1.0 else f"exp({power:.3g} * {full})"
+    amplitude = full if parameter.null == 0.0 else f"({full} - {parameter.null:g})"
+    factor = f"{full}^{power:.2f}" if parameter.null == 1.0 else f"exp({power:.3g} * {amplitude})"
     return Combination(f"p_m * {factor}", math.exp(fit.log_p_m), sigma)

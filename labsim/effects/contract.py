@@ -111,6 +111,8 @@ class Instrument:
         0.0  # m, standard deviation of additional point spread, in quadrature with the assumed one
     )
 
+    static_factor: float = 1.0  # static over dynamic compressive strength: a test at rest measures the former
+
     def replace(self, **changes: float) -> Instrument:
         return replace(self, **changes)
 

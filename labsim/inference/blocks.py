@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +19,7 @@ class Block:
     """residual : (n,); covariance : (n, n); tangents : name of global -> (n,).
 
     free : (n, n) covariance of what an unknown cause of unit size may do here, None where it may do nothing.
-    by_speed : (n,) change with the impact speed, per its stated standard uncertainty, of a map.
+    nuisances : (n, k) what the observation's own nuisances change, per standard uncertainty of each; none where it has none.
     Arrays are never written to: the covariance is factorised once.
     """
 
@@ -27,7 +27,7 @@ class Block:
     covariance: FloatArray
     tangents: Mapping[str, FloatArray]
     free: FloatArray | None = None
-    by_speed: FloatArray | None = None
+    nuisances: FloatArray | None = None
 
     @cached_property
     def lower(self) -> FloatArray:
@@ -65,3 +65,34 @@ def factorise(covariance: FloatArray) -> FloatArray:
     except np.linalg.LinAlgError:
         pass
     raise ExtrapolationError("simulation", "runs", "extrapolate to no finite depth here; see labsim runs")
+
+
+def solve_globals(
+    blocks: Sequence[Block], names: Sequence[str], priors: Mapping[str, tuple[float, float]]
+) -> tuple[FloatArray, FloatArray, float, float, list[FloatArray]]:
+    """Step of the globals (k,), their covariance, χ² left, ln det C, and C⁻¹ (residual - tangents step) per block.
+
+    priors: name -> (distance of the current value from the prior's middle, prior width); flat where absent.
+    """
+    information, gradient = np.zeros((len(names), len(names))), np.zeros(len(names))
+    designs, log_determinant = [], 0.0
+    for block in blocks:
+        design = np.stack([block.tangents[name] for name in names], axis=1)
+        solved = block.solve(design)
+        information += design.T @ solved
+        gradient += solved.T @ block.residual
+        log_determinant += block.log_determinant
+        designs.append(design)
+    for k, name in enumerate(names):
+        if name in priors:
+            away, width = priors[name]
+            information[k, k] += 1 / width**2
+            gradient[k] -= away / width**2
+    covariance = np.linalg.inv(information)
+    step = covariance @ gradient
+    chi_square, weighted = 0.0, []
+    for block, design in zip(blocks, designs, strict=True):
+        left = block.residual - design @ step
+        weighted.append(block.solve(left))
+        chi_square += float(left @ weighted[-1])
+    return step, covariance, chi_square, log_determinant, weighted

@@ -32,6 +32,7 @@ from .workbench import Workbench
 LEANS = 2.0  # standard errors of ln p_m from an end of its range: one in twenty of the Gaussian is cut off from there on
 AT = 0.1  # the same, that nobody would tell from none
 LOST = 1e-6  # p value of a nominal fit that is not believed
+STATIC = "static_strength"  # nobody knows beforehand that dust at rest is as strong as in a drop
 FIRST_START = 1414.0  # Pa, or what the range has nearest to it: laboratories report some kPa
 OTHER_STARTS = (500.0, 3500.0)  # Pa
 
@@ -111,6 +112,8 @@ def calibrate(
 ) -> Calibration:
     """Posterior of p_m (Pa) and of effects named in ``parameters`` ("shear_strength" or "shear_strength.factor").
 
+    Where static tests of compression or shear are among the data, "static_strength" (static over dynamic p_m) is one of them.
+
     model : effects (and material) held fixed as part of the simulation, as read from a model.toml.
     Returns a Calibration; its posterior opens with ArviZ.
     Raises InferenceError for an unknown parameter, MeasurementError and SimulationError as the parts do.
@@ -136,6 +139,8 @@ def calibrate(
         if name not in bench.effects:
             reason = bench.reasons.get(name, f"is none of {', '.join(sorted(bench.effects))}")
             raise InferenceError(campaign.folder, f"parameter {name}", reason)
+    if STATIC in bench.effects and STATIC not in names and STATIC not in dict(model.effects if model else ()):
+        names += (STATIC,)
     fit = fit_hypothesis(bench, names, (nominal.log_p_m, {})) if names else nominal
     if list_large(bench, fit):
         fit = settle(bench, fit)

@@ -18,14 +18,14 @@ SPEED_WIDTH = 0.05  # of ln speed, prior width
 LEAST_SURFACE = 1e-9  # m
 
 
-@dataclass
+@dataclass(frozen=True)
 class DropModel:
-    """One drop with its response table and current nuisances."""
+    """One drop with its response table. start : its nuisances by its own free fall; matrix : (points, frames) averages that."""
 
     observed: ObservedDrop
     table: ResponseTable
-    instant: Instant
-    matrix: FloatArray  # averages free-fall frames: (points, frames)
+    start: Instant
+    matrix: FloatArray
 
     @property
     def radius(self) -> float:
@@ -55,21 +55,20 @@ class DropModel:
             code, self.observed.time, instant, instrument.pixel_factor, instrument.rate_factor
         )
 
-    def move(self, best: FloatArray) -> float:
-        """Take up the best nuisances (contact time, ln speed, surface row; in prior widths) and say how far that was.
+    def move(self, before: Instant, best: FloatArray) -> tuple[Instant, float]:
+        """Nuisances after the best step (contact time, ln speed, surface row; in prior widths), and how far that was.
 
         The largest move in prior widths; contact time in units of a frame, speed in per cent.
         """
-        before = self.instant
-        self.instant = Instant(
+        after = Instant(
             before.contact_time + best[0] * FREE,
             before.log_speed + best[1] * SPEED_WIDTH,
             best[2] * self.surface_sigma,
         )
-        return max(
+        return after, max(
             abs(best[0] * FREE) * self.camera.frame_rate,
             abs(best[1] * SPEED_WIDTH) * 100,
-            abs(self.instant.surface - before.surface) / self.surface_sigma,
+            abs(after.surface - before.surface) / self.surface_sigma,
         )
 
 

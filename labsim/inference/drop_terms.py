@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,7 +11,9 @@ import numpy as np
 
 from ..effects import Instrument
 from ..records import STANDARD_GRAVITY, FloatArray
+from ..sph import DropSetting
 from .drop_model import FREE, SPEED_WIDTH, DropModel
+from .forward import Instant
 
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error
@@ -39,11 +41,13 @@ class Terms:
 
 class Probe(NamedTuple):
     """A neighbouring point. amplitudes : effect -> amplitude; instruments, log_offsets (of ln p_m) : by name of drop or scan;
-    step : by how much one global differs there."""
+    setting : (name of drop or scan) -> what would be simulated there, for those whose data need no run; step : by how much one
+    global differs there."""
 
     amplitudes: Mapping[str, float]
     instruments: Mapping[str, Instrument]
     log_offsets: Mapping[str, float]
+    setting: Callable[[str], DropSetting]
     step: float
 
 
@@ -75,10 +79,15 @@ class DropTerms:
 
 
 def linearise_drop(
-    model: DropModel, log_p_m: float, nominal: Probe, terms: Terms, probes: Mapping[str, Probe]
+    model: DropModel,
+    instant: Instant,
+    log_p_m: float,
+    nominal: Probe,
+    terms: Terms,
+    probes: Mapping[str, Probe],
 ) -> DropTerms:
-    """Residual, errors and tangents of one drop; nominal : the point itself (its step means nothing)."""
-    observed, instant = model.observed, model.instant
+    """Residual, errors and tangents of one drop; instant : its nuisances; nominal : the point itself (its step means nothing)."""
+    observed = model.observed
     name, n = observed.name, model.matrix.shape[0]
     instrument = nominal.instruments[name]
     lp = log_p_m + nominal.log_offsets.get(name, 0.0)
@@ -86,7 +95,7 @@ def linearise_drop(
     code = response.code(nominal.amplitudes)
     here = model.predict(code, instrument, instant)
     speed = model.predict_speed(code, instrument, instant)
-    faster = replace(instant, log_speed=instant.log_speed + 1e-3)
+    faster = instant._replace(log_speed=instant.log_speed + 1e-3)
     fast_code = model.table.code(lp, faster.log_speed, nominal.amplitudes)
     by_speed = (model.predict(fast_code, instrument, faster) - here) / 1e-3
     strong_code = model.table.code(lp + 1e-2, instant.log_speed, nominal.amplitudes)
@@ -146,12 +155,12 @@ def linearise_drop(
         numerical,
     )
     if terms.heights:
-        drop = _add_height(drop, model)
+        drop = _add_height(drop, model, instant)
     # nuisances are zero-mean about their priors, not about here
     return replace(drop, residual=drop.residual + drop.local @ pull)
 
 
-def _add_height(drop: DropTerms, model: DropModel) -> DropTerms:
+def _add_height(drop: DropTerms, model: DropModel, instant: Instant) -> DropTerms:
     """The stated height is one more datum: ln v."""
     height = model.observed.drop.height
     if height is None or height.value <= 0:
@@ -166,7 +175,7 @@ def _add_height(drop: DropTerms, model: DropModel) -> DropTerms:
 
     numerical = drop.numerical
     return DropTerms(
-        np.append(drop.residual, expected - model.instant.log_speed),
+        np.append(drop.residual, expected - instant.log_speed),
         np.append(drop.white, sigma**2),
         np.vstack([drop.local, [0.0, SPEED_WIDTH, 0.0, 0.0]]),
         drop.pull,

@@ -73,9 +73,9 @@ def _integrate_likelihood(bench: Workbench, fit: Fit, log_p_m: float, amplitudes
             numerical_change=bench.terms.numerical_change * math.exp(size),
             zone_change=bench.terms.zone_change * math.exp(size),
         )
-        linear = linearise_at(replace(bench, terms=terms), fit.models, fit.scan_speeds, log_p_m, amplitudes)
-        drops.append(_log_likelihood([linear.drops]))
-        maps.append(_log_likelihood(linear.further))
+        blocks = linearise_at(replace(bench, terms=terms), fit.nuisances, log_p_m, amplitudes)
+        drops.append(_log_likelihood(blocks[:1]))
+        maps.append(_log_likelihood(blocks[1:]))
     return _over_sizes(drops) + _over_sizes(maps)
 
 

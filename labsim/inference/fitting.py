@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from scipy.stats import chi2
 
 from ..records import FloatArray
-from .drop_model import DropModel
 from .evidence import integrate_by_laplace
-from .likelihood import Linearised
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
 from .steps import Place, Solved, advance, hold, hold_strength, settle_nuisances, solve_at
-from .tangents import linearise_at
-from .workbench import Workbench, find_family
+from .tangents import Blocks, linearise_at
+from .tracks import DropsBlock
+from .workbench import Workbench
 
 Hypothesis = tuple[str, ...]
 ITERATIONS = 12
@@ -46,11 +45,17 @@ class Fit:
     points: int
     log_likelihood: float
     evidence: float
-    linear: Linearised
-    models: list[DropModel]
-    scan_speeds: tuple[float, ...] = ()  # ln of the impact speeds of the scans, at their best
+    blocks: Blocks
+    nuisances: tuple[FloatArray, ...]  # of every observation, at their best
     # of ln p_m over the shapes of the effect that were fitted, by their evidence: mean minus this one's, standard deviation
     over_shapes: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def drops(self) -> DropsBlock:
+        """All drops about the fit."""
+        first = self.blocks[0]
+        assert isinstance(first, DropsBlock)
+        return first
 
     @property
     def log_p_m_over_shapes(self) -> tuple[float, float]:
@@ -78,14 +83,9 @@ def fit_hypothesis(
     least : ln likelihood, priors included, of a start below which no step is taken.
     iterations : most steps of the globals; with none they stay, and the nuisances alone are moved to their best.
     """
-    # tables are those of the workbench, nuisances the fit's own
-    models = [
-        replace(model, table=bench.tables[_table_number(bench, model)])
-        for model in (nuisances.models if nuisances is not None else bench.models)
-    ]
-    speeds = nuisances.scan_speeds if nuisances is not None else tuple(scan.stated for scan in bench.scans)
+    begin = tuple(each.begin() for each in bench.observations) if nuisances is None else nuisances.nuisances
     values = {name: hold(bench, name, start[1].get(name, 0.0)) for name in hypothesis}
-    place = Place(hold_strength(bench, start[0]), values, models, speeds)
+    place = Place(hold_strength(bench, start[0]), values, begin)
     best: Solved | None = None
     share, settled, calm = 1.0, False, False
     for iteration in range(iterations + 1):
@@ -117,9 +117,8 @@ def fit_hypothesis(
         best.points,
         best.log_likelihood,
         integrate_by_laplace(bench, best),
-        best.linear,
-        best.place.models,
-        best.place.speeds,
+        best.blocks,
+        best.place.nuisances,
     )
 
 
@@ -129,20 +128,16 @@ def goodness_of_fit(fit: Fit) -> float:
     Contact time and speed of each drop are free; parts that are known better than they scatter do not hide one that fails.
     """
     worst = []
-    for k, block in enumerate(fit.linear.blocks):
-        free = 1 + len(fit.hypothesis) + 2 * len(fit.models) if k == 0 else 0
+    for block in fit.blocks:
+        free = 1 + len(fit.hypothesis) + 2 * len(block.sections) if isinstance(block, DropsBlock) else 0
         worst.append(float(chi2.sf(block.chi_square, max(block.residual.size - free, 1))))
     return min(1.0, len(worst) * min(worst))
 
 
-def _table_number(bench: Workbench, model: DropModel) -> int:
-    return find_family(bench.families, model.observed.drop.projectile, is_scan=False)
-
-
-def with_probes(bench: Workbench, fit: Fit, names: Sequence[str], log_p_m: float | None = None) -> Linearised:
-    """The linearisation of a fit (or of its nuisances at another p_m) with tangents of further effects at their null."""
+def with_probes(bench: Workbench, fit: Fit, names: Sequence[str], log_p_m: float | None = None) -> Blocks:
+    """The observations about a fit (or of its nuisances at another p_m) with tangents of further effects at their null."""
     place = fit.log_p_m if log_p_m is None else log_p_m
-    return linearise_at(bench, fit.models, fit.scan_speeds, place, fit.values, names)
+    return linearise_at(bench, fit.nuisances, place, fit.values, names)
 
 
 def _ask(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -101,8 +102,7 @@ def _log_strengths(indices: Iterable[float]) -> list[float]:
     return [math.log(strength_node(index)) for index in indices]
 
 
-@dataclass(frozen=True)
-class Instant:
+class Instant(NamedTuple):
     """Nuisances of one drop: contact on the true clock (s), ln of the true speed, offset of the surface row (m, stated scale)."""
 
     contact_time: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,15 +12,19 @@ from ..effects.model import Model, apply_effects, check_model
 from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..sph import DropSetting
+from .curves import encode_run
 from .drop_model import make_drop_model
 from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import Family, RunGrid, few_positions, speed_nodes
+from .observation import Observation, RunFeatures
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
-from .scans import ObservedScan, ScanModel
+from .scans import CompactedZone, ObservedScan, encode_scan_run
+from .static_tests import make_static_tests
 from .supported import refuse_others
-from .undisturbed import UndisturbedDust
+from .tracks import Tracks
+from .undisturbed import Layering, UndisturbedDust
 from .workbench import Workbench
 
 SCAN_MARGIN = 1.06
@@ -47,22 +52,29 @@ def open_workbench(
     if not drops:
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
+    observations: list[Observation] = []
     members: dict[Projectile, list[ObservedDrop]] = {}
     for drop in drops:
         members.setdefault(drop.drop.projectile.simulated, []).append(drop)
-    tables, models = [], []
+    models, features = [], []
     for projectile, group in members.items():
         nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
-        families.append(Family(projectile, nodes, False, few))
         table = ResponseTable(np.log(nodes), few)
-        tables.append(table)
+        features.append(RunFeatures(len(families), table, encode_run))
+        families.append(Family(projectile, nodes, False, few))
         models += [make_drop_model(drop, table) for drop in group]
-    scan_models = []
+    observations.append(Tracks(tuple(models), tuple(features)))
     for projectile, scanned in _group_scans(scans).items():
         nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
-        families.append(Family(projectile, nodes, True, few))
         for scan in scanned:
-            scan_models.append(ScanModel(scan, ResponseTable(np.log(nodes), few)))
+            encode = partial(encode_scan_run, observed=scan)
+            own = RunFeatures(len(families), ResponseTable(np.log(nodes), few), encode)
+            observations.append(CompactedZone(scan, (own,)))
+        families.append(Family(projectile, nodes, True, few))
+    if undisturbed:
+        observations.append(Layering(tuple(undisturbed), campaign.sample.filling_factor_sigma))
+    if tests := make_static_tests(campaign):
+        observations.append(tests)
     resolved, reasons = {}, {}
     for name, effect in effects.items():
         reason = effect.applies(campaign)
@@ -82,11 +94,8 @@ def open_workbench(
         places,
         resolved,
         terms or Terms(),
-        tables,
-        models,
+        tuple(observations),
         reasons,
-        scan_models,
-        list(undisturbed),
     )
     if model is not None:
         extend(bench, model)

@@ -24,6 +24,7 @@ from ..sph import DropRun
 from .blocks import Block
 from .drop_terms import Probe, Terms
 from .forward import ResponseTable
+from .observation import RunFeatures
 from .run_parts import Compaction
 from .undisturbed import GREY, observe_undisturbed
 
@@ -134,19 +135,42 @@ def encode_scan_run(run: DropRun | Compaction, observed: ObservedScan) -> FloatA
     return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
 
 
-@dataclass
-class ScanModel:
+@dataclass(frozen=True)
+class CompactedZone:
+    """The zone of one scan that is compared, an Observation. Nuisances : (1,) ln of the impact speed."""
+
     observed: ObservedScan
-    table: ResponseTable
+    features: tuple[RunFeatures, ...]
+    kind: str = "map"
 
     @property
-    def stated(self) -> float:
-        """ln of the stated impact speed; every fit moves its own copy to its best value."""
-        return math.log(self.observed.scan.speed.value)
+    def table(self) -> ResponseTable:
+        return self.features[0].table
+
+    def begin(self) -> FloatArray:
+        return np.array([math.log(self.observed.scan.speed.value)])
+
+    def linearise(
+        self,
+        nuisances: FloatArray,
+        log_p_m: float,
+        nominal: Probe,
+        terms: Terms,
+        probes: Mapping[str, Probe],
+    ) -> Block:
+        return linearise_zone(self, float(nuisances[0]), log_p_m, nominal, terms, probes)
+
+    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
+        """The move in two stated uncertainties of the speed."""
+        assert block.nuisances is not None
+        spread = self.observed.scan.speed.sigma / self.observed.scan.speed.value
+        best = np.clip(block.nuisances.T @ weighted, -3.0, 3.0)
+        moved = self.begin() + best * spread
+        return moved, 0.5 * float(np.abs(moved - nuisances).max()) / spread
 
 
-def linearise_scan(
-    model: ScanModel,
+def linearise_zone(
+    model: CompactedZone,
     log_speed: float,
     log_p_m: float,
     nominal: Probe,
@@ -192,7 +216,7 @@ def linearise_scan(
         np.append(changed * terms.zone_change, 0.0),
         np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
     ]
-    pull = (log_speed - model.stated) / spread
+    pull = (log_speed - float(model.begin()[0])) / spread
     columns = np.stack(nuisances, axis=1)
     covariance += columns @ columns.T
     covariance[np.diag_indices(n + 1)] += 1e-12
@@ -204,7 +228,7 @@ def linearise_scan(
     # what an unknown cause changes is alike in all cells of like contrast
     size = np.append(contrast, 0.0)
     like = np.exp(-0.5 * (np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))) ** 2)
-    return Block(residual, covariance, tangents, np.outer(size, size) * like, nuisances[0])
+    return Block(residual, covariance, tangents, np.outer(size, size) * like, columns[:, :1])
 
 
 def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:
@@ -212,14 +236,3 @@ def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:
     full[observed.cells] = cells
     slope = np.gradient(full, observed.reduced.map.z, axis=0)
     return np.nan_to_num(slope[observed.cells])
-
-
-def update_speed(
-    model: ScanModel, log_speed: float, block: Block, weighted: FloatArray
-) -> tuple[float, float]:
-    """Conditional best ln of the impact speed, and the move there in stated uncertainties."""
-    speed = model.observed.scan.speed
-    assert block.by_speed is not None
-    best = float(np.clip(block.by_speed @ weighted, -3.0, 3.0))
-    moved = model.stated + best * speed.sigma / speed.value
-    return moved, abs(moved - log_speed) * speed.value / speed.sigma

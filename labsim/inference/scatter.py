@@ -62,17 +62,17 @@ def estimate_scatter(bench: Workbench, fit: Fit) -> ScatterEstimate:
     The likelihood is evaluated on a ladder of scatters with everything else as fitted; the drops' offsets enter through the
     tangent of ln p_m.
     """
-    linear = fit.linear
-    tangent = linear.tangents["ln_p_m"]
+    drops = fit.drops
+    tangent = drops.tangents["ln_p_m"]
     used = bench.terms.scatter
     value = []
     for scatter in LADDER:
-        covariance = linear.covariance.copy()
-        for section in linear.sections.values():
+        covariance = drops.covariance.copy()
+        for section in drops.sections.values():
             column = tangent[section]
             covariance[section, section] += (scatter**2 - used**2) * np.outer(column, column)
         lower = np.linalg.cholesky(covariance)
-        white = solve_triangular(lower, np.stack([linear.residual, tangent], axis=1), lower=True)
+        white = solve_triangular(lower, np.stack([drops.residual, tangent], axis=1), lower=True)
         information = white[:, 1] @ white[:, 1]
         left = white[:, 0] - white[:, 1] * (white[:, 1] @ white[:, 0]) / information
         value.append(-0.5 * (left @ left) - np.sum(np.log(np.diag(lower))) - 0.5 * math.log(information))

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..records import FloatArray
-from .drop_model import DropModel
-from .likelihood import Linearised, solve_globals, update_nuisances
-from .scans import update_speed
-from .tangents import linearise_at
+from .blocks import Block, solve_globals
+from .tangents import Blocks, linearise_at
 from .workbench import Workbench
 
 SETTLED = 0.02  # of a standard deviation
@@ -21,12 +19,11 @@ CALM = 0.05  # move of nuisances, as move_nuisances counts it
 
 @dataclass(frozen=True)
 class Place:
-    """Where a fit stands. models : of the drops, with their nuisances; speeds : ln, of the scans."""
+    """Where a fit stands. nuisances : of every observation."""
 
     log_p_m: float
     values: dict[str, float]
-    models: list[DropModel]
-    speeds: tuple[float, ...]
+    nuisances: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Solved:
     """
 
     place: Place
-    linear: Linearised
+    blocks: Blocks
     step: FloatArray
     covariance: FloatArray
     chi_square: float
@@ -48,16 +45,14 @@ class Solved:
 
 def solve_at(bench: Workbench, place: Place) -> Solved:
     """The likelihood about a place with the runs that there are."""
-    linear = linearise_at(bench, place.models, place.speeds, place.log_p_m, place.values)
+    blocks = linearise_at(bench, place.nuisances, place.log_p_m, place.values)
     priors = {name: (value, bench.effects[name].amplitudes[0].scale) for name, value in place.values.items()}
-    step, covariance, _left, logdet, _weighted = solve_globals(
-        linear.blocks, ("ln_p_m", *place.values), priors
-    )
-    chi_square = sum(block.chi_square for block in linear.blocks)
-    points = sum(block.residual.size for block in linear.blocks)
+    step, covariance, _left, logdet, _weighted = solve_globals(blocks, ("ln_p_m", *place.values), priors)
+    chi_square = sum(block.chi_square for block in blocks)
+    points = sum(block.residual.size for block in blocks)
     log_likelihood = -0.5 * (chi_square + logdet + points * math.log(2 * math.pi))
     height = log_likelihood - 0.5 * sum((away / width) ** 2 for away, width in priors.values())
-    return Solved(place, linear, step, covariance, chi_square, points, log_likelihood, height)
+    return Solved(place, blocks, step, covariance, chi_square, points, log_likelihood, height)
 
 
 def settle_nuisances(bench: Workbench, here: Solved, most: int) -> Solved:
@@ -87,33 +82,28 @@ def advance(bench: Workbench, here: Solved, share: float) -> tuple[Place, bool]:
 def _follow(bench: Workbench, here: Solved, log_p_m: float, values: dict[str, float]) -> tuple[Place, float]:
     """The place at other globals, its nuisances at what is best with them as seen from here, and how far these moved."""
     place = here.place
-    models, speeds = [replace(model) for model in place.models], list(place.speeds)
     taken = {"ln_p_m": log_p_m - place.log_p_m}
     taken |= {name: values[name] - before for name, before in place.values.items()}
     weighted = []
-    for block in here.linear.blocks:
+    for block in here.blocks:
         change = sum(part * block.tangents[name] for name, part in taken.items())
         weighted.append(block.solve(block.residual - change))
-    shift = move_nuisances(bench, models, speeds, here.linear, weighted)
-    return Place(log_p_m, values, models, tuple(speeds)), shift
+    nuisances, shift = move_nuisances(bench, place.nuisances, here.blocks, weighted)
+    return Place(log_p_m, values, nuisances), shift
 
 
 def move_nuisances(
     bench: Workbench,
-    models: list[DropModel],
-    speeds: list[float],
-    linear: Linearised,
+    nuisances: Sequence[FloatArray],
+    blocks: Sequence[Block],
     weighted: Sequence[FloatArray],
-) -> float:
-    """Move the nuisances of drops, and speeds (ln) of scans, to their conditional best values; weighted : as solve_globals gives.
-
-    The largest move: in prior widths, contact time in units of a frame, speeds of scans in two of theirs.
-    """
-    shift = update_nuisances(models, linear, weighted[0])
-    for k, (scan, block) in enumerate(zip(bench.scans, linear.scans, strict=True)):
-        speeds[k], moved_by = update_speed(scan, speeds[k], block, weighted[1 + k])
-        shift = max(shift, 0.5 * moved_by)
-    return shift
+) -> tuple[tuple[FloatArray, ...], float]:
+    """Nuisances of every observation at their conditional best, and the largest move; weighted : as solve_globals gives."""
+    followed = [
+        observation.follow(own, block, left)
+        for observation, own, block, left in zip(bench.observations, nuisances, blocks, weighted, strict=True)
+    ]
+    return tuple(own for own, _ in followed), max(move for _, move in followed)
 
 
 def stop_at_limits(bench: Workbench, here: Solved) -> tuple[FloatArray, set[int]]:

@@ -58,12 +58,9 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
 
     def residual(theta: FloatArray) -> FloatArray:
         values = dict(zip(fit.hypothesis, theta[1:], strict=True))
-        linear = linearise_at(bench, fit.models, fit.scan_speeds, float(theta[0]), values)
+        blocks = linearise_at(bench, fit.nuisances, float(theta[0]), values)
         return np.concatenate(
-            [
-                fitted.whiten(block.residual)
-                for fitted, block in zip(fit.linear.blocks, linear.blocks, strict=True)
-            ]
+            [fitted.whiten(block.residual) for fitted, block in zip(fit.blocks, blocks, strict=True)]
         )
 
     bounds = [[math.log(p) for p in bench.campaign.p_m_range]]
@@ -101,8 +98,8 @@ def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[fl
         rstate=np.random.default_rng(seed),
     )
     sampler.run_nested(dlogz=0.05, print_progress=False)
-    points = sum(block.residual.size for block in fit.linear.blocks)
-    determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.linear.blocks)
+    points = sum(block.residual.size for block in fit.blocks)
+    determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.blocks)
     constant = -0.5 * (determinant + points * math.log(2 * math.pi))
     price = sum(bench.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
     return float(sampler.results.logz[-1]) + constant + price, float(sampler.results.logzerr[-1])

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..ct.reduce import ReducedScan
-from ..effects import Instrument
 from ..records import FloatArray, Scan
-from ..sph import DropSetting
 from ..sph.particles import initial_filling_factor
 from .blocks import Block
+from .drop_terms import Probe, Terms
+from .observation import RunFeatures
 
 REACH = 3.0  # tip radii about the bead and its path within which dust may have moved
 SMOOTH, SMOOTH_LENGTH = 3e-4, 3e-4  # of the filling factor; m
@@ -68,20 +68,39 @@ def observe_undisturbed(reduced: ReducedScan) -> UndisturbedDust | None:
     return UndisturbedDust(reduced.scan, np.array(depth), np.array(level), np.array(sigma), spread)
 
 
-Seen = tuple[DropSetting, Instrument]
+@dataclass(frozen=True)
+class Layering:
+    """The undisturbed dust of all scans, an Observation without runs and nuisances. sigma : stated, of the sample's φ0."""
+
+    dust: tuple[UndisturbedDust, ...]
+    sigma: float
+    kind: str = "undisturbed dust"
+    features: tuple[RunFeatures, ...] = ()
+
+    def begin(self) -> FloatArray:
+        return np.empty(0)
+
+    def linearise(
+        self,
+        nuisances: FloatArray,
+        log_p_m: float,
+        nominal: Probe,
+        terms: Terms,
+        probes: Mapping[str, Probe],
+    ) -> Block:
+        return linearise_layering(self.dust, nominal, probes, self.sigma)
+
+    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
+        return nuisances, 0.0
 
 
-def linearise_undisturbed(
+def linearise_layering(
     dust: Sequence[UndisturbedDust],
-    nominal: Mapping[str, Seen],
-    probes: Mapping[str, tuple[Mapping[str, Seen], float]],
+    nominal: Probe,
+    probes: Mapping[str, Probe],
     filling_factor_sigma: float,
 ) -> Block:
-    """All scans as one independent part of the data.
-
-    nominal : name of scan -> setting (its initial state counts) and instrument of the current point; probes : name of global ->
-    (the same after a step, step). filling_factor_sigma : stated, of the sample.
-    """
+    """All scans about the point ``nominal``; of its settings the initial state counts."""
     data = np.concatenate([np.append(each.filling_factor, math.log(each.point_spread)) for each in dust])
     here = _expect(dust, nominal)
     row = np.concatenate([np.append(np.ones(each.depth.size), 0.0) for each in dust])
@@ -95,18 +114,18 @@ def linearise_undisturbed(
     level = row * math.hypot(filling_factor_sigma, GREY * float(np.mean(data[row > 0])))
     covariance += np.outer(level, level) + POINT_SPREAD_SIGMA[1] ** 2 * np.outer(spread, spread)
     tangents: dict[str, FloatArray] = {"ln_p_m": np.zeros(data.size)}
-    for name, (seen, step) in probes.items():
-        tangents[name] = (_expect(dust, seen) - here) / step
+    for name, point in probes.items():
+        tangents[name] = (_expect(dust, point) - here) / point.step
     # an unnamed layering is the same in all samples, and grows with nothing but depth
     free = np.outer(row * here, row * here) * np.exp(-0.5 * (apart / FREE_LENGTH) ** 2)
     return Block(data - here, covariance, tangents, free)
 
 
-def _expect(dust: Sequence[UndisturbedDust], seen: Mapping[str, Seen]) -> FloatArray:
+def _expect(dust: Sequence[UndisturbedDust], point: Probe) -> FloatArray:
     parts = []
     for each in dust:
-        setting, instrument = seen[each.name]
-        level = instrument.stated_filling_factor(initial_filling_factor(setting, each.depth))
+        instrument = point.instruments[each.name]
+        level = instrument.stated_filling_factor(initial_filling_factor(point.setting(each.name), each.depth))
         spread = math.hypot(POINT_SPREAD_VOXELS * each.scan.voxel, instrument.ct_blur)
         parts.append(np.append(level, math.log(spread)))
     return np.concatenate(parts)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,8 +12,7 @@ from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
-from .curves import encode_run
-from .drop_model import DropModel
+from ..sph import DropSetting
 from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import (
@@ -26,9 +23,11 @@ from .grid import (
     RunGrid,
 )
 from .nodes import amplitude_nodes, enclosing_nodes, screening_node
+from .observation import Observation, RunFeatures
 from .observe import ObservedDrop
-from .scans import ScanModel, encode_scan_run
-from .undisturbed import UndisturbedDust
+from .scans import CompactedZone
+from .tracks import Tracks
+from .undisturbed import Layering, UndisturbedDust
 
 
 @dataclass
@@ -42,11 +41,8 @@ class Workbench:
     places: dict[str, Place]
     effects: dict[str, Effect]
     terms: Terms
-    tables: list[ResponseTable]
-    models: list[DropModel]
+    observations: tuple[Observation, ...]  # all drops first
     reasons: dict[str, str]  # why an effect does not apply
-    scans: list[ScanModel] = field(default_factory=list)
-    undisturbed: list[UndisturbedDust] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     # ln of what fitting a shape beforehand costs
     shape_evidence: dict[str, float] = field(default_factory=dict)
@@ -58,23 +54,37 @@ class Workbench:
         default_factory=dict, repr=False
     )
 
+    @property
+    def tracks(self) -> Tracks:
+        """All drops."""
+        first = self.observations[0]
+        assert isinstance(first, Tracks)
+        return first
+
+    @property
+    def scans(self) -> list[CompactedZone]:
+        """The compacted zones that are compared."""
+        return [each for each in self.observations if isinstance(each, CompactedZone)]
+
+    @property
+    def undisturbed(self) -> list[UndisturbedDust]:
+        """Scans whose undisturbed dust is compared."""
+        return [dust for each in self.observations if isinstance(each, Layering) for dust in each.dust]
+
+    @property
+    def features(self) -> list[RunFeatures]:
+        """What all observations take of runs."""
+        return [each for observation in self.observations for each in observation.features]
+
     def _encode(
         self, number: int, index: float, variant: str, cells: int | None
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
-        tables: list[tuple[ResponseTable, Callable[[Any], FloatArray]]]  # of the part of a run that it reads
-        if not self.families[number].is_scan:
-            tables = [(self.tables[number], encode_run)]
-        else:
-            tables = [
-                (scan.table, partial(encode_scan_run, observed=scan.observed))
-                for scan in self.scans
-                if self._scan_family(scan) == number
-            ]
         return [
-            (table, None if runs is None else np.array([encode(run) for run in runs]))
-            for table, encode in tables
+            (each.table, None if runs is None else np.array([each.encode(run) for run in runs]))
+            for each in self.features
+            if each.family == number
         ]
 
     def _encode_plain(
@@ -101,10 +111,6 @@ class Workbench:
             entry = kept.setdefault(name, {}).setdefault(index, {})
             if codes is not None and plain is not None:
                 entry[amplitude] = codes - plain
-
-    def _scan_family(self, scan: ScanModel) -> int:
-        p = scan.observed.scan.projectile
-        return find_family(self.families, p, is_scan=True)
 
     def strength_only(self, name: str) -> bool:
         """Whether an effect changes nothing of a drop but p_m: then the base runs already hold it."""
@@ -167,6 +173,20 @@ class Workbench:
         index = screening_node(log_p_m)
         wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self.effects[name], 0.0)]
         self.require_changes(wanted, f"{name} at another p_m", coarse=True)
+
+    def initial_setting(self, amplitudes: Mapping[str, float], name: str) -> DropSetting:
+        """What would be simulated at the place of a drop or scan, for data that need no run: its initial state counts.
+
+        Any other name is a sample of its own, neither early nor late.
+        """
+        place = self.places.get(name) or replace(
+            next(iter(self.places.values())), name=name, sequence_fraction=0.0
+        )
+        setting = self.grid.setting(self.families[0], self.families[0].speeds[0], 1000.0)
+        for effect, amplitude in amplitudes.items():
+            if amplitude != 0.0:
+                setting = self.effects[effect].apply(setting, self.at(effect, amplitude), place)
+        return setting
 
     def instruments(self, amplitudes: Mapping[str, float]) -> dict[str, Instrument]:
         made = {}

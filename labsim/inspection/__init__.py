@@ -17,32 +17,35 @@ from .missing import list_missing
 from .resistance import judge_resistance
 from .scales import judge_scales
 from .scans import inspect_scan
+from .strength import inspect_strength_test
 
 Progress = Callable[[float, float, str], None]
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """drops, scans : one Found each; odd, missing : lines of the campaign as a whole."""
+    """drops, scans, tests (of strength) : one Found each; odd, missing : lines of the campaign as a whole."""
 
     drops: list[Found]
     scans: list[Found]
+    tests: list[Found]
     odd: list[str]
     missing: list[str]
 
     @property
+    def parts(self) -> list[Found]:
+        """All that was measured."""
+        return [*self.drops, *self.scans, *self.tests]
+
+    @property
     def troubles(self) -> dict[str, LabsimError]:
         """Why a drop or scan cannot be read, by its name."""
-        return {
-            found.name: found.trouble for found in (*self.drops, *self.scans) if found.trouble is not None
-        }
+        return {found.name: found.trouble for found in self.parts if found.trouble is not None}
 
     @property
     def all_odd(self) -> list[str]:
         """What looks odd, of the campaign first, then of each drop and scan with its name."""
-        return self.odd + [
-            f"{found.name}: {text}" for found in (*self.drops, *self.scans) for text in found.odd
-        ]
+        return self.odd + [f"{found.name}: {text}" for found in self.parts for text in found.odd]
 
 
 def inspect_campaign(campaign: Campaign, progress: Progress) -> Inspection:
@@ -56,4 +59,5 @@ def inspect_campaign(campaign: Campaign, progress: Progress) -> Inspection:
         scans.append(inspect_scan(scan, campaign))
         progress(len(drops) + len(scans), total, "reading drops and scans")
     judge_resistance(campaign, drops)
-    return Inspection(drops, scans, judge_scales(drops), list_missing(campaign))
+    tests = [inspect_strength_test(test, campaign) for test in campaign.strength_tests]
+    return Inspection(drops, scans, tests, judge_scales(drops), list_missing(campaign))

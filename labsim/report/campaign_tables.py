@@ -58,7 +58,7 @@ def _name_calibrated(samples: FloatArray) -> dict[str, Any]:
 
 def campaign_calibration_lines(found: Calibration) -> str:
     p_m = summarise(found.posterior.samples("p_m_Pa"))
-    drops, scans = len(found.bench.models), len(found.bench.scans)
+    drops, scans = len(found.bench.tracks.models), len(found.bench.scans)
     lines = [
         *_say_doubts(found),
         f"{found.campaign.name}: p_m = {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa "

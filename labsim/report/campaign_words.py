@@ -21,7 +21,7 @@ from .phrases import add_article, list_names, say_count, say_range, shown_unit, 
 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
     sample = campaign.sample
-    frames = sum(model.observed.time.size for model in bench.models)
+    frames = sum(model.observed.time.size for model in bench.tracks.models)
     words = (
         f"{say_count(len(views), 'drop')} with {frames} frames, {say_count(len(campaign.scans), 'CT scan')}, into dust of "
         f"filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, {sample.diameter * 1e3:g} mm wide and "
@@ -29,7 +29,7 @@ def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[D
         f"with gravity of {campaign.gravity:g} m/s²."
     )
     groups: dict[tuple, list[DropView]] = {}
-    drops = {model.observed.name: model.observed for model in bench.models}
+    drops = {model.observed.name: model.observed for model in bench.tracks.models}
     for view in views:
         camera = drops[view.name].drop.camera
         key = (say_projectile(view), camera and camera.frame_rate, camera and camera.pixel_size)

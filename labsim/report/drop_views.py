@@ -10,7 +10,7 @@ import numpy as np
 
 from ..inference.drop_model import DropModel
 from ..inference.fitting import Fit
-from ..inference.forward import predict_depth
+from ..inference.forward import Instant, predict_depth
 from ..inference.workbench import Workbench
 from ..records import FloatArray, Projectile
 
@@ -65,19 +65,22 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
     views = []
     first = fits[0][1]
     offsets = {name: contact_offset(bench, fit) for name, fit in fits}
-    for model in first.models:
+    tracks = bench.tracks
+    seen_by = {name: tracks.instants(fit.nuisances[0]) for name, fit in fits}
+    for k, (model, instant) in enumerate(
+        zip(tracks.models, tracks.instants(first.nuisances[0]), strict=True)
+    ):
         observed = model.observed
-        clock = observed.time - model.instant.contact_time
+        clock = observed.time - instant.contact_time
         seen = clock > -BEFORE * max(clock.max(), 1e-9)
         simulated = {}
         for name, fit in fits:
-            other = next(m for m in fit.models if m.observed.name == observed.name)
-            simulated[name] = predict_drop(bench, fit, other, offsets[name])[seen]
+            simulated[name] = predict_drop(bench, fit, model, seen_by[name][k], offsets[name])[seen]
         views.append(
             DropView(
                 observed.name,
                 observed.drop.projectile,
-                math.exp(model.instant.log_speed),
+                math.exp(instant.log_speed),
                 clock[seen],
                 observed.depth[seen],
                 simulated,
@@ -88,26 +91,28 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
     return views
 
 
-def predict_drop(bench: Workbench, fit: Fit, model: DropModel, contact: float) -> FloatArray:
-    """Stated depth (m) at the drop's frames; contact : the fit's contact_offset."""
+def predict_drop(
+    bench: Workbench, fit: Fit, model: DropModel, instant: Instant, contact: float
+) -> FloatArray:
+    """Stated depth (m) at the drop's frames; instant : its nuisances; contact : the fit's contact_offset."""
     name = model.observed.name
     instrument = bench.instruments(fit.values)[name]
     log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[name]
-    code = model.table.code(log_p_m, model.instant.log_speed, fit.values)
+    code = model.table.code(log_p_m, instant.log_speed, fit.values)
     offset = instrument.row_offset_px * model.observed.pixel
     offset += contact * model.radius
     time = model.observed.time
-    return predict_depth(code, time, model.instant, instrument.pixel_factor, instrument.rate_factor, offset)
+    return predict_depth(code, time, instant, instrument.pixel_factor, instrument.rate_factor, offset)
 
 
 def contact_offset(bench: Workbench, fit: Fit) -> float:
     """Best value, in tip radii, of the offset of the contact that the likelihood allows all drops in common."""
-    linear, size = fit.linear, bench.terms.contact_offset
-    column = np.zeros(linear.residual.size)
-    for model in fit.models:
-        section = linear.sections[model.observed.name]
+    drops, size = fit.drops, bench.terms.contact_offset
+    column = np.zeros(drops.residual.size)
+    for model in bench.tracks.models:
+        section = drops.sections[model.observed.name]
         column[section.start : section.start + model.matrix.shape[0]] = size * model.radius
-    return size * float(column @ linear.drops.solve(linear.residual))
+    return size * float(column @ drops.solve(drops.residual))
 
 
 def allow_for_errors(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
@@ -116,12 +121,12 @@ def allow_for_errors(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray
     The likelihood's own variances without what predict_drop has already moved to its best value (contact time, speed,
     surface row, contact offset): localisation, sample scatter, stated mass and scales, error of the solver.
     """
-    linear, observed = fit.linear, model.observed
-    place = next(k for k, other in enumerate(fit.models) if other.observed.name == observed.name)
+    drops, observed = fit.drops, model.observed
+    place = list(drops.sections).index(observed.name)
     points = model.matrix.shape[0]
-    start = linear.sections[observed.name].start
-    variance = np.diag(linear.covariance)[start : start + points].copy()
-    variance -= np.sum(linear.local[place][:points, :3] ** 2, axis=1)
+    start = drops.sections[observed.name].start
+    variance = np.diag(drops.covariance)[start : start + points].copy()
+    variance -= np.sum(drops.local[place][:points, :3] ** 2, axis=1)
     variance -= (bench.terms.contact_offset * model.radius) ** 2
     variance -= observed.sigma**2 * np.sum(model.matrix**2, axis=1)
     systematic = np.interp(observed.time, model.matrix @ observed.time, np.maximum(variance, 0.0))

@@ -11,6 +11,7 @@ import numpy as np
 from ..ct.reduce import reduce_scan
 from ..errors import MeasurementError
 from ..inference.fitting import Fit
+from ..inference.scans import CompactedZone
 from ..inference.workbench import Workbench
 from ..records import Campaign, FillingMap, FloatArray
 
@@ -39,11 +40,13 @@ class MapView:
 def view_maps(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[MapView]:
     """Every scan of the likelihood; simulated dust is seen through the scan's own cells, blur and grey level."""
     views = []
-    for number, scan in enumerate(bench.scans):
+    for number, scan in enumerate(bench.observations):
+        if not isinstance(scan, CompactedZone):
+            continue
         observed = scan.observed
         simulated = {}
         for name, fit in fits:
-            code = scan.table.code(fit.log_p_m, fit.scan_speeds[number], fit.values)
+            code = scan.table.code(fit.log_p_m, float(fit.nuisances[number][0]), fit.values)
             scale = bench.instruments(fit.values)[observed.name].ct_scale
             full = np.full(observed.cells.shape, np.nan)
             full[observed.cells] = scale * code[1:]

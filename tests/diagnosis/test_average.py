@@ -22,8 +22,8 @@ def a_fit(hypothesis, p_m, sigma, over_shapes=(0.0, 0.0)):
         points=0,
         log_likelihood=0.0,
         evidence=0.0,
-        linear=None,
-        models=[],
+        blocks=(),
+        nuisances=(),
         over_shapes=over_shapes,
     )
 

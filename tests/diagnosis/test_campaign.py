@@ -57,8 +57,8 @@ def fake_fit(hypothesis, evidence):
         1,
         0.0,
         evidence,
-        None,
-        [],
+        (),
+        (),
     )
 
 

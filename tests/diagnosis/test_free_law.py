@@ -17,9 +17,8 @@ from labsim.diagnosis.free_law import EMBEDDED, Tangents, average, gather, integ
 from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, combine, make_hats
 from labsim.diagnosis.unknown import FREEDOMS
 from labsim.effects import Place, list_effects
-from labsim.inference.blocks import Block
+from labsim.inference.blocks import Block, solve_globals
 from labsim.inference.fitting import fit_hypothesis
-from labsim.inference.likelihood import solve_globals
 from labsim.inference.open_workbench import open_workbench
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden

@@ -1,7 +1,6 @@
 """Held-out drops against the conditional normal distribution worked out another way, and the gain against its formula."""
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +9,7 @@ from scipy.stats import kstest, multivariate_normal
 
 from labsim.diagnosis.gain import HeldOut, check_prediction, measure_gain, predict_held_out
 from labsim.inference.blocks import Block
-from labsim.inference.likelihood import Linearised
+from labsim.inference.tracks import DropsBlock
 
 POINTS, DROPS, WIDE, SCALE = 6, 5, 100.0, 0.3
 NAMES = [f"D{k:02d}" for k in range(1, DROPS + 1)]
@@ -31,7 +30,7 @@ def make_fit(seed: int, *, hidden: float = 0.0):
         + tangents[EFFECT] * hidden
     )
     sections = {name: slice(k * POINTS, (k + 1) * POINTS) for k, name in enumerate(NAMES)}
-    linear = Linearised(residual, covariance, tangents, sections, [], [])
+    drops = DropsBlock(residual, covariance, tangents, sections=sections)
     models = [
         SimpleNamespace(
             matrix=np.eye(POINTS),
@@ -39,12 +38,15 @@ def make_fit(seed: int, *, hidden: float = 0.0):
         )
         for name in NAMES
     ]
-    fit = SimpleNamespace(linear=linear, models=models, hypothesis=(EFFECT,), values={EFFECT: 0.0})
-    bench = SimpleNamespace(effects={EFFECT: SimpleNamespace(amplitudes=[SimpleNamespace(scale=SCALE)])})
+    fit = SimpleNamespace(drops=drops, blocks=(drops,), hypothesis=(EFFECT,), values={EFFECT: 0.0})
+    bench = SimpleNamespace(
+        effects={EFFECT: SimpleNamespace(amplitudes=[SimpleNamespace(scale=SCALE)])},
+        tracks=SimpleNamespace(models=models),
+    )
     return bench, fit
 
 
-def condition(linear: Linearised, held: np.ndarray, widths: dict[str, float]):
+def condition(linear: Block, held: np.ndarray, widths: dict[str, float]):
     """Mean and covariance of held-out points given all others: globals are one more normal error each."""
     joint = linear.covariance + sum(
         width**2 * np.outer(linear.tangents[name], linear.tangents[name]) for name, width in widths.items()
@@ -61,8 +63,8 @@ def test_a_held_out_drop_is_predicted_as_a_normal_distribution_says(known):
     for k in range(DROPS):
         held = np.zeros(POINTS * DROPS, dtype=bool)
         held[k * POINTS + POINTS // 2 : (k + 1) * POINTS] = True  # below the surface
-        mean, spread = condition(fit.linear, held, widths)
-        data = fit.linear.residual[held]
+        mean, spread = condition(fit.drops, held, widths)
+        data = fit.drops.residual[held]
         assert found.count[k] == POINTS // 2
         assert found.rms[k] == pytest.approx(math.sqrt(np.mean((data - mean) ** 2)), rel=1e-4)
         assert found.expected[k] == pytest.approx(math.sqrt(np.mean(np.diag(spread))), rel=1e-4)
@@ -105,14 +107,14 @@ def test_what_a_prior_and_a_scan_say_of_the_globals_is_drawn_as_well():
         bench, fit = make_fit(seed, hidden=amplitude)
         tangents = {"ln_p_m": np.zeros(8), EFFECT: np.full(8, 3.0)}
         block = Block(tangents[EFFECT] * amplitude + random.normal(size=8), np.eye(8), tangents)
-        fit.linear = replace(fit.linear, scans=(block,))
+        fit.blocks = (fit.drops, block)
         found.append(check_prediction(bench, fit, random, draws=400))
     assert kstest(found, "uniform").pvalue > 0.01
 
 
 def test_a_single_drop_leaves_nothing_to_check():
     bench, fit = make_fit(1)
-    fit.models = fit.models[:1]
+    bench.tracks.models = bench.tracks.models[:1]
     assert check_prediction(bench, fit, np.random.default_rng(1)) == 1.0
 
 

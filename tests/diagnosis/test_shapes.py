@@ -13,7 +13,7 @@ from labsim.inference.fitting import Fit
 
 
 def fit_shape(log_p_m: float, evidence: float) -> Fit:
-    return Fit(("rate",), log_p_m, {"rate": 0.1}, np.eye(2), 1.0, 1, 0.0, evidence, None, [])  # type: ignore[arg-type]
+    return Fit(("rate",), log_p_m, {"rate": 0.1}, np.eye(2), 1.0, 1, 0.0, evidence, (), ())  # type: ignore[arg-type]
 
 
 def test_p_m_over_two_shapes() -> None:

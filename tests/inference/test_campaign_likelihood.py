@@ -1,18 +1,17 @@
 """Codes of curves, nodes, free fall, the linear algebra and the sampler, each against an answer known otherwise."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from labsim.inference.blocks import solve_globals
 from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
 from labsim.inference.evidence import log_share_inside
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
-from labsim.inference.likelihood import solve_globals
 from labsim.inference.nodes import enclosing_nodes
 from labsim.inference.observe import observe_drop
 from labsim.inference.posterior import measure_residual, sample
@@ -87,7 +86,7 @@ def test_prediction_is_continuous_at_contact_and_scales_with_the_instrument():
         plain, rel=1e-9, abs=1e-12
     )
     step = 1e-7
-    later = predict_depth(code, grid, replace(instant, contact_time=5e-3 + step), 1.0, 1.0, 0.0)
+    later = predict_depth(code, grid, instant._replace(contact_time=5e-3 + step), 1.0, 1.0, 0.0)
     speed = predict_speed(code, grid, instant, 1.0, 1.0)
     inside = np.abs(grid - 5e-3) > 1e-5
     assert ((plain - later) / step)[inside] == pytest.approx(speed[inside], rel=1e-3, abs=1e-4)

@@ -55,10 +55,9 @@ def by_quadrature(log_p_m, amplitude):
 
 
 def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
-    def linearise(bench, models, speeds, log_p_m, values, further=()):
+    def linearise(bench, nuisances, log_p_m, values, further=()):
         amplitude = values["effect"]
-        drops = Block(residual(log_p_m, amplitude), covariance(bench.terms, amplitude), {})
-        return SimpleNamespace(drops=drops, further=[])
+        return (Block(residual(log_p_m, amplitude), covariance(bench.terms, amplitude), {}),)
 
     monkeypatch.setattr(error_sizes, "linearise_at", linearise)
     fit = SimpleNamespace(
@@ -66,8 +65,7 @@ def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
         log_p_m=MIDDLE,
         values={"effect": 0.5},
         covariance=np.array([[0.05**2, -0.9 * 0.05 * 0.06], [-0.9 * 0.05 * 0.06, 0.06**2]]),
-        models=[],
-        scan_speeds=(),
+        nuisances=(),
     )
     bounds = np.array([np.log([300.0, 6000.0]), PARAMETER.limits])
     target = SimpleNamespace(log_probability=surrogate, misfit=misfit, bounds=bounds)

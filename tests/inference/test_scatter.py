@@ -32,12 +32,12 @@ def set_residuals(scatter: float, seed: int, used: float = 0.02):
     for section in sections.values():
         covariance[section, section] += used**2 * np.outer(tangent[section], tangent[section])
     residual = offsets * tangent + 3e-7 * rng.standard_normal(DROPS * POINTS)
-    linear = SimpleNamespace(
+    drops = SimpleNamespace(
         tangents={"ln_p_m": tangent}, covariance=covariance, sections=sections, residual=residual
     )
     campaign = SimpleNamespace(sample=SimpleNamespace(scatter=None))
     bench = SimpleNamespace(terms=SimpleNamespace(scatter=used), campaign=campaign)
-    return bench, SimpleNamespace(linear=linear)
+    return bench, SimpleNamespace(drops=drops)
 
 
 @pytest.mark.parametrize(("scatter", "least"), [(0.02, 0), (0.06, 95), (0.10, 100)])
@@ -56,7 +56,7 @@ def test_prior_of_a_scatter_is_what_it_stands_for():
     bench, fit = set_residuals(0.08, 5)
     asked = find_scatter(bench, fit)
     assert 0.05 < asked.value < 0.13
-    offsets = fit.linear.residual.reshape(DROPS, POINTS).mean(axis=1) / 1e-4
+    offsets = fit.drops.residual.reshape(DROPS, POINTS).mean(axis=1) / 1e-4
     squares, noise = np.sum((offsets - offsets.mean()) ** 2), (3e-3) ** 2 / POINTS
 
     def likelihood(scatter: float) -> float:

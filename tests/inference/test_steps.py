@@ -19,19 +19,17 @@ def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
     parameter = Parameter("amount", "1", 0.0, limits, Normal(0.0, 2.0), 1.0, "of a test")
     seen = []
 
-    def linearise(bench, models, speeds, log_p_m, values, further=()):
+    def linearise(bench, nuisances, log_p_m, values, further=()):
         prediction, tangents = predict(log_p_m, values.get("effect", 0.0))
         seen.append(log_p_m)
         names = dict(zip(("ln_p_m", "effect"), np.atleast_2d(tangents).T, strict=False))
-        block = Block(data - prediction, sigma**2 * np.eye(data.size), names)
-        return SimpleNamespace(blocks=[block], scans=(), local=[], sections={})
+        return (Block(data - prediction, sigma**2 * np.eye(data.size), names),)
 
     monkeypatch.setattr(steps, "linearise_at", linearise)
     return SimpleNamespace(
         campaign=SimpleNamespace(p_m_range=RANGE),
         effects={"effect": SimpleNamespace(amplitudes=[parameter])},
-        models=[],
-        scans=[],
+        observations=[SimpleNamespace(begin=lambda: np.empty(0), follow=lambda own, block, left: (own, 0.0))],
         shape_evidence={},
         costs_runs=lambda name: False,
         require_base=lambda nodes: None,

@@ -14,7 +14,7 @@ from labsim.effects import list_effects
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.open_workbench import open_workbench
 from labsim.inference.runs import RunStore
-from labsim.inference.tangents import linearise_dust
+from labsim.inference.tangents import linearise_alone
 from labsim.inference.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.records import Scan
 
@@ -49,6 +49,10 @@ def open_bench(campaign, drops, tmp_path, levels, rng, spread=1.0):
     )
 
 
+def linearise_dust(bench, values, steps):
+    return linearise_alone(bench, bench.observations[-1], values, steps)
+
+
 def chi_square(block) -> float:
     return float(block.residual @ np.linalg.solve(block.covariance, block.residual))
 
@@ -57,7 +61,7 @@ def test_flat_dust_fits_the_nominal_model(campaign, drops, tmp_path):
     values = []
     for seed in range(20):
         bench = open_bench(campaign, drops, tmp_path, [0.15, 0.15], np.random.default_rng(seed))
-        (block,) = linearise_dust(bench, {}, {})
+        block = linearise_dust(bench, {}, {})
         values.append(chi_square(block))
     # no more than the number of data, as the errors hold more than the noise drawn here
     assert np.mean(values) < block.residual.size
@@ -67,14 +71,14 @@ def test_flat_dust_fits_the_nominal_model(campaign, drops, tmp_path):
 def test_tangents_are_the_exact_differences(campaign, drops, tmp_path):
     bench = open_bench(campaign, drops, tmp_path, [0.15], np.random.default_rng(1))
     steps = {"surface_crust": 0.01, "density_gradient": 1.0, "filling_factor": 0.004, "ct_scale": 0.01}
-    (block,) = linearise_dust(bench, {}, steps)
+    block = linearise_dust(bench, {}, steps)
     length = shape_parameter(bench.effects["surface_crust"]).null
     assert block.tangents["surface_crust"][:-1] == pytest.approx(np.exp(-DEPTH / length), rel=1e-9)
     assert block.tangents["density_gradient"][:-1] == pytest.approx(DEPTH, rel=1e-9)
     assert block.tangents["filling_factor"][:-1] == pytest.approx(np.ones(DEPTH.size), rel=1e-9)
     assert block.tangents["ct_scale"][:-1] == pytest.approx(np.full(DEPTH.size, 0.15), rel=1e-9)
     assert np.all(block.tangents["ln_p_m"] == 0)
-    (wide,) = linearise_dust(bench, {"ct_blur": 2 * bench.undisturbed[0].scan.voxel}, {})
+    wide = linearise_dust(bench, {"ct_blur": 2 * bench.undisturbed[0].scan.voxel}, {})
     assert wide.residual[-1] - block.residual[-1] == pytest.approx(-0.5 * math.log(5.0), rel=1e-9)
 
 

@@ -36,7 +36,7 @@ def test_a_drop_that_shows_nothing_is_left_out_and_said(place):
     head, *rows = track.read_text().splitlines()
     track.write_text("\n".join([head, *rows[-15:]]) + "\n")  # begins below the surface
     found = diagnose_campaign(read_campaign(folder), laws.LawStore(place / "store"), workers=1)
-    assert [model.observed.name for model in found.bench.models if model.observed.name == "D02"] == []
+    assert [model.observed.name for model in found.bench.tracks.models if model.observed.name == "D02"] == []
     assert any("drop D02 left out" in warning for warning in found.warnings)
 
 

@@ -1,0 +1,118 @@
+"""All drops of a campaign as one part of the data, with every error they are known to have.
+
+    y = prediction(globals, nuisances) + noise,  covariance C = blocks of
+        localisation (white, from the track), contact time (free), impact speed (free, tied to the stated height),
+        surface row (stated), pixel and frame scale (stated or SCALE_SIGMA), sample scatter of ln p_m and stated mass error
+        (a random ln p_m per drop), numerical error of the solver (smooth over fraction of the stop, depth and size).
+
+Nuisances enter linearly about their current best values and are integrated out. Each term has a switch in Terms. Formulas:
+docs/inference.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..records import FloatArray
+from .blocks import Block
+from .drop_model import DropModel
+from .drop_terms import DropTerms, NumericalError, Probe, Terms, linearise_drop
+from .forward import Instant
+from .observation import RunFeatures
+
+
+@dataclass(frozen=True)
+class DropsBlock(Block):
+    """All drops about one point. sections : drop -> slice of the data; local : per drop, (points, nuisances) scaled by their
+    prior widths."""
+
+    sections: dict[str, slice] = field(default_factory=dict)
+    local: tuple[FloatArray, ...] = ()
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """All drops that are compared, an Observation. models : one a drop; features : of one projectile each.
+
+    Nuisances : (drops, 3) contact time (s), ln of the impact speed, offset of the surface row (m).
+    """
+
+    models: tuple[DropModel, ...]
+    features: tuple[RunFeatures, ...]
+    kind: str = "drops"
+
+    def begin(self) -> FloatArray:
+        return np.array([model.start for model in self.models])
+
+    def instants(self, nuisances: FloatArray) -> list[Instant]:
+        """Nuisances by name, one record a drop."""
+        return [Instant(*map(float, row)) for row in nuisances]
+
+    def linearise(
+        self,
+        nuisances: FloatArray,
+        log_p_m: float,
+        nominal: Probe,
+        terms: Terms,
+        probes: Mapping[str, Probe],
+    ) -> DropsBlock:
+        parts = [
+            linearise_drop(model, instant, log_p_m, nominal, terms, probes)
+            for model, instant in zip(self.models, self.instants(nuisances), strict=True)
+        ]
+        ends = np.cumsum([part.residual.size for part in parts])
+        sections = {
+            model.observed.name: slice(int(end) - part.residual.size, int(end))
+            for model, part, end in zip(self.models, parts, ends, strict=True)
+        }
+        return DropsBlock(
+            np.concatenate([part.residual for part in parts]),
+            _add_errors(parts, list(sections.values())),
+            {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
+            sections=sections,
+            local=tuple(part.local for part in parts),
+        )
+
+    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
+        assert isinstance(block, DropsBlock)
+        moved, moves = [], [0.0]
+        for model, instant, local in zip(self.models, self.instants(nuisances), block.local, strict=True):
+            # in prior widths, about their middles
+            best = local.T @ weighted[block.sections[model.observed.name]]
+            after, move = model.move(instant, best)
+            moved.append(after)
+            moves.append(move)
+        return np.array(moved), max(moves)
+
+
+def _add_errors(parts: Sequence[DropTerms], sections: Sequence[slice]) -> FloatArray:
+    """Covariance (n, n) of all drops: each one's own, what they share, the solver's."""
+    covariance = numerical_covariance([part.numerical for part in parts])
+    for part, own in zip(parts, sections, strict=True):
+        covariance[own, own] += part.local @ part.local.T + np.diag(part.white)
+    shared = {name: None for part in parts for name in part.shared}
+    columns = np.zeros((len(covariance), len(shared)))
+    for k, name in enumerate(shared):
+        for part, own in zip(parts, sections, strict=True):
+            if name in part.shared:
+                columns[own, k] = part.shared[name]
+    covariance += columns @ columns.T
+    return covariance
+
+
+def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
+    """The solver's error of the depth: as large as terms.numerical of the depth reached, alike for alike drops."""
+    size = np.concatenate([part.size for part in parts])
+    fraction = np.concatenate([part.fraction for part in parts])
+    apart = np.zeros((len(parts), len(parts)))  # the same for all points of two drops
+    for name, scale in (("reach", 0.8), ("radius", 2.0), ("mass", 1.5)):
+        value = np.array([getattr(part, name) for part in parts])
+        apart += (np.subtract.outer(value, value) / scale) ** 2
+    counts = [part.size.size for part in parts]
+    distance = np.subtract.outer(fraction, fraction) / 0.4
+    distance *= distance
+    distance += np.repeat(np.repeat(apart, counts, axis=0), counts, axis=1)
+    return np.asarray(np.outer(size, size) * np.exp(-0.5 * distance))

@@ -1,0 +1,50 @@
+"""One static strength test: whether its rows are those of one sample that gets stronger as it gets denser."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..records import Campaign, StrengthTest
+from .found import ODD, Found
+
+LEAST_ROWS = 6  # below, a curve through the rows says nothing of their scatter
+OFTEN = 2.0  # scatter over stated error from which that is too small
+
+
+def inspect_strength_test(test: StrengthTest, campaign: Campaign) -> Found:
+    phi, stress = np.array(sorted(test.points)).T
+    found = Found(
+        test.name,
+        f"{test.kind.replace('_', ' ')}, {phi.size} rows, filling factor {phi[0]:.3f} to {phi[-1]:.3f}, "
+        f"{stress.min() / 1e3:.3g} to {stress.max() / 1e3:.3g} kPa ± {100 * test.relative_sigma:.3g} %",
+        {
+            "filling_factor": [float(phi[0]), float(phi[-1])],
+            "stress_Pa": [float(stress.min()), float(stress.max())],
+        },
+    )
+    fall = (np.maximum.accumulate(np.log(stress)) - np.log(stress)).max()
+    if fall > 2 * ODD * math.sqrt(2) * test.relative_sigma:
+        found.odd.append(
+            f"the stress falls by {100 * (1 - math.exp(-fall)):.0f} % while the dust gets denser: an unloading, or another "
+            "sample; leave those rows out"
+        )
+    elif phi.size >= LEAST_ROWS and np.ptp(phi) > 1e-3:
+        curve = np.polynomial.Polynomial.fit(phi, np.log(stress), min(4, phi.size - 3))
+        left = np.log(stress) - curve(phi)
+        scatter = math.sqrt(left @ left / (phi.size - curve.degree() - 1))
+        if scatter > OFTEN * test.relative_sigma:
+            found.odd.append(
+                f"rows scatter by {100 * scatter:.2g} % about a smooth curve, relative_sigma says "
+                f"{100 * test.relative_sigma:.2g} %"
+            )
+    material = campaign.material
+    if test.kind in ("compression_omnidirectional", "shear"):
+        outside = int(np.sum((phi <= material.phi_1) | (phi >= material.phi_2)))
+        if outside:
+            found.odd.append(
+                f"{outside} rows lie outside phi_1 = {material.phi_1:g} to phi_2 = {material.phi_2:g} of campaign.toml, where "
+                "the law has no strength; labsim strength finds both"
+            )
+    return found
