@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from .campaign_tables import find_toml, list_parts
+from .campaign_tables import find_toml, list_parts, read_source
 from .errors import CampaignError, LabsimError
 from .records import STRENGTH_KINDS, Sample, StrengthTest
 from .tables import Document, Table
@@ -55,6 +55,7 @@ def read_strength_test(path: Path | str, sample: Sample) -> StrengthTest:
         columns = [table.text("filling_factor_column"), table.text("pressure_column")]
         units = [1.0, _choose(table, "pressure_unit", PRESSURES, "Pa")]
         area, full = 0.0, 0.0
+    source = read_source(document)
     document.close()
     points = []
     for number, first, second in _read_columns(data, table, columns):
@@ -75,7 +76,7 @@ def read_strength_test(path: Path | str, sample: Sample) -> StrengthTest:
     if not FEWEST <= len(points) <= MOST:
         raise CampaignError(data, "", f"holds {len(points)} rows; a test has {FEWEST} to {MOST}")
     name = file.resolve().parent.name
-    return StrengthTest(name, kind, tuple(points), sigma)  # type: ignore[arg-type]
+    return StrengthTest(name, kind, tuple(points), sigma, source)  # type: ignore[arg-type]
 
 
 def _choose(table: Table, key: str, units: dict[str, float], default: str) -> float:

@@ -200,6 +200,7 @@ class StrengthTest:
     kind: Literal["compression_omnidirectional", "compression_unidirectional", "tension", "shear"]
     points: tuple[tuple[float, float], ...]
     relative_sigma: float
+    source: dict = field(default_factory=dict)  # strength.toml [source] as written
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ def check(
 ) -> None:
     """Say what is in a campaign, what is missing and what looks odd."""
     read = read_campaign(campaign)
+    from ..inference import observations
     from ..inspection import inspect_campaign  # needs heavy libraries, mistakes in the files do not
 
     with options.show_progress(quiet or as_json or not sys.stderr.isatty()) as progress:
@@ -30,7 +31,8 @@ def check(
     wide = max((len(each.name) for each in found), default=0)
     summary = describe_campaign(read)
     lines = [summary["text"], "there:", *(f"  {each.name:{wide}}  {each.line}" for each in found)]
-    code = [f"effects/{file.name}" for file in list_own_files(read.folder).values()]
+    own = [*list_own_files(read.folder).values(), *observations.list_own_files(read.folder)]
+    code = [f"{file.parent.name}/{file.name}" for file in own]
     lines += [
         f"  {name}  code of this campaign: calibrate, diagnose and effects run it, check does not"
         for name in code

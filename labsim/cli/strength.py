@@ -29,7 +29,7 @@ def strength(
 ) -> None:
     """Fit the curves of static compression, tension and shear tests, and compare them with the drops' p_m."""
     from ..inference.drop_terms import Terms
-    from ..inference.static_tests import PARAMETERS, fit_softness, fit_strength
+    from ..inference.observations.static_tests import PARAMETERS, fit_softness, fit_strength
     from ..report.strength_figures import draw_strength
 
     read = read_campaign(campaign)

@@ -18,10 +18,10 @@ from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import Family, RunGrid, few_positions, speed_nodes
 from .observation import Observation, RunFeatures
+from .observations import observe_further
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
 from .scans import CompactedZone, ObservedScan, encode_scan_run
-from .static_tests import make_static_tests
 from .supported import refuse_others
 from .tracks import Tracks
 from .undisturbed import Layering, UndisturbedDust
@@ -73,8 +73,7 @@ def open_workbench(
         families.append(Family(projectile, nodes, True, few))
     if undisturbed:
         observations.append(Layering(tuple(undisturbed), campaign.sample.filling_factor_sigma))
-    if tests := make_static_tests(campaign):
-        observations.append(tests)
+    observations += observe_further(campaign)
     resolved, reasons = {}, {}
     for name, effect in effects.items():
         reason = effect.applies(campaign)

@@ -16,7 +16,7 @@ OFTEN = 2.0  # scatter over stated error from which that is too small
 def inspect_strength_test(test: StrengthTest, campaign: Campaign) -> Found:
     phi, stress = np.array(sorted(test.points)).T
     found = Found(
-        test.name,
+        f"strength/{test.name}",
         f"{test.kind.replace('_', ' ')}, {phi.size} rows, filling factor {phi[0]:.3f} to {phi[-1]:.3f}, "
         f"{stress.min() / 1e3:.3g} to {stress.max() / 1e3:.3g} kPa ± {100 * test.relative_sigma:.3g} %",
         {

@@ -22,8 +22,9 @@ from .phrases import add_article, list_names, say_count, say_range, shown_unit, 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
     sample = campaign.sample
     frames = sum(model.observed.time.size for model in bench.tracks.models)
+    tests = f", {say_count(len(campaign.strength_tests), 'static test')}" if campaign.strength_tests else ""
     words = (
-        f"{say_count(len(views), 'drop')} with {frames} frames, {say_count(len(campaign.scans), 'CT scan')}, into dust of "
+        f"{say_count(len(views), 'drop')} with {frames} frames, {say_count(len(campaign.scans), 'CT scan')}{tests}, into dust of "
         f"filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, {sample.diameter * 1e3:g} mm wide and "
         f"{sample.depth * 1e3:g} mm deep, in gas of {sample.gas_pressure:g} Pa. The nominal simulation is {campaign.geometry}, "
         f"with gravity of {campaign.gravity:g} m/s²."

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..inference.static_tests import StrengthFit
+from ..inference.observations.static_tests import StrengthFit
 from ..records import Campaign
 from ..sph.materials.porous_dust import compressive_strength
 from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, new_figure

@@ -16,12 +16,12 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from ..errors import InferenceError
-from ..records import Campaign, FloatArray, Material, StrengthTest
-from ..sph.materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths
-from .blocks import Block
-from .drop_terms import Probe, Terms
-from .observation import RunFeatures
+from ...errors import InferenceError
+from ...records import Campaign, FloatArray, Material, StrengthTest
+from ...sph.materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths
+from ..blocks import Block
+from ..drop_terms import Probe, Terms
+from ..observation import RunFeatures
 
 PARAMETERS = {  # of each kind's own curve, with units
     "compression_omnidirectional": (("p_m", "Pa"), ("phi_1", "1"), ("phi_2", "1"), ("delta", "1")),
@@ -197,7 +197,7 @@ class StaticTests:
         )
 
 
-def make_static_tests(campaign: Campaign) -> StaticTests | None:
+def observe(campaign: Campaign) -> StaticTests | None:
     """The tests of a campaign that are compared; None where there is none."""
     tests = tuple(test for test in campaign.strength_tests if test.kind in COMPARED)
     return StaticTests(tests) if tests else None
