@@ -37,6 +37,7 @@ import numpy as np  # noqa: E402
 from attempts import Attempt, attempt  # noqa: E402
 from mutations import change_bytes, change_json, change_text  # noqa: E402
 from small_campaign import copy_campaign  # noqa: E402
+from strength_tests import make_test, write_test  # noqa: E402
 
 CPU, WALL = 10, 120.0  # s; the second only for what waits for ever, on a machine that is shared
 FAR = 4.0  # standard deviations
@@ -44,6 +45,7 @@ TRACK = ["--fps", "5000", "--pixel-um", "40", "-o", "out", "-q"]
 TABLE = ["--fps", "10000", "--pixel-um", "20", "--surface-row", "300", "-o", "out", "-q"]
 QUICK = "--geometry planar --set material.bulk_modulus_Pa=4500 --spacing-um 125 --speed-m-s 0.3 --time-ms 0.01".split()
 MODEL = ["--model", "model.toml", "--store", "out/store"]
+STATIC = ["strength", "static", "-o", "out", "-q"]
 VALUES = [
     "nan",
     "inf",
@@ -79,13 +81,15 @@ JUNK = [
 
 # kind -> file that is changed, command, text or bytes or JSON, whether results are compared, share of all
 KINDS: dict[str, tuple[str, list[str], str, bool, float]] = {
-    "track.csv": ("t/track.csv", ["track", "t/track.csv", *TABLE], "text", True, 0.13),
+    "track.csv": ("t/track.csv", ["track", "t/track.csv", *TABLE], "text", True, 0.11),
     "tracker txt": ("t/table.txt", ["track", "t/table.txt", *TABLE], "text", True, 0.06),
     "tracker trk": ("t/d.trk", ["track", "t/d.trk", *TABLE], "text", True, 0.05),
     "tracker trz": ("t/d.trz", ["track", "t/d.trz", *TABLE], "bytes", True, 0.04),
     "trackpy csv": ("t/trackpy.csv", ["track", "t/trackpy.csv", *TABLE], "text", True, 0.06),
     "campaign.toml": ("campaign/campaign.toml", ["check", "campaign", "-q"], "text", False, 0.07),
-    "drop.toml": ("campaign/drops/D05/drop.toml", ["check", "campaign", "-q"], "text", False, 0.07),
+    "drop.toml": ("campaign/drops/D05/drop.toml", ["check", "campaign", "-q"], "text", False, 0.05),
+    "strength.toml": ("static/strength/S01/strength.toml", STATIC, "text", False, 0.02),
+    "strength csv": ("static/strength/S01/curve.csv", STATIC, "text", False, 0.02),
     "scan.toml": ("scan/scan.toml", ["ct", "scan", "-o", "out", "-q"], "text", False, 0.03),
     "model.toml": ("model.toml", ["simulate", *QUICK, *MODEL, "-o", "out", "-q"], "text", False, 0.06),
     "run.json": ("result/run.json", ["rerun", "result", "-o", "out", "-q"], "json", False, 0.04),
@@ -147,6 +151,7 @@ def write_sound(home: Path) -> None:
     from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 
     copy_campaign(home / "campaign")
+    write_test(copy_campaign(home / "static"), make_test("compression_omnidirectional", 1))
     (home / "t").mkdir()
     table = home / "t" / "track.csv"
     shutil.copy(home / "campaign/drops/D05/track.csv", table)
