@@ -15,7 +15,7 @@ FLOORS = [
     {"video", "ct", "sph"},  # siblings that never import each other
     {"own_keys"},
     {"campaign_tables", "repeated_records"},
-    {"campaign_scans"},
+    {"campaign_scans", "campaign_strength"},
     {"campaign"},
     {"effects", "tracking"},
     {"inference"},

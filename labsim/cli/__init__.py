@@ -71,8 +71,8 @@ class CommandFolder(typer.core.TyperGroup):
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         for parameter in self.get_params(ctx):
-            if parameter.name == "show_completion" and hasattr(parameter, "help"):
-                parameter.help = "Show it, to copy or to change it."  # typer's own takes two lines
+            if isinstance(parameter, typer.core.TyperOption) and parameter.name == "show_completion":
+                parameter.hidden = True  # works as ever; the page fits a screen
         super().format_options(ctx, formatter)
 
     def list_commands(self, ctx: object) -> list[str]:

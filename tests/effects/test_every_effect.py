@@ -50,6 +50,7 @@ NAMES = {
     "surface_row": {"offset"},
     "ct_scale": {"factor"},
     "ct_blur": {"sigma"},
+    "static_strength": {"factor"},
     "resolution": {"spacing"},
     "artificial_viscosity": {"alpha"},
     "planar_geometry": set(),
@@ -119,6 +120,7 @@ def observe(name: str, values: dict[str, float], base: DropSetting) -> dict[str,
         "curve": np.interp(np.linspace(1.0e-4, 1.2e-3, 12), time, depth),
         "filling_factor": seen,
         "blur": instrument.ct_blur,
+        "static": instrument.static_factor,
     }
 
 
@@ -237,7 +239,7 @@ def test_the_stated_direction_holds(name: str) -> None:
 def test_the_tangent_at_null_does_not_hang_on_its_step(name: str) -> None:
     effect, base = EFFECTS[name], make_setting(name)
     parameter = effect.amplitudes[0]
-    kind = "filling_factor" if name == "ct_scale" else "blur" if name == "ct_blur" else "curve"
+    kind = {"ct_scale": "filling_factor", "ct_blur": "blur", "static_strength": "static"}.get(name, "curve")
     nominal = observe(name, effect.at(), base)[kind]
     long, short = (
         (observe(name, {parameter.name: parameter.null + share * parameter.step}, base)[kind] - nominal)
@@ -338,9 +340,9 @@ def test_values_outside_the_limits_are_refused(name: str) -> None:
 def test_every_effect_says_whether_it_applies(name: str) -> None:
     effect: Effect = EFFECTS[name]
     reason = effect.applies(CAMPAIGN)
-    assert (reason != "") == (name in {"gravity", "planar_geometry"})
+    assert (reason != "") == (name in {"gravity", "planar_geometry", "static_strength"})
     bare = dataclasses.replace(
         CAMPAIGN, gravity=0.0, geometry="planar", scans=(), drops=CAMPAIGN.drops[:3]
     )  # in the plane, three drops, no CT
-    silent = {"ct_scale", "ct_blur", "sample_drift", "side_friction"}
+    silent = {"ct_scale", "ct_blur", "sample_drift", "side_friction", "static_strength"}
     assert (effect.for_campaign(bare).applies(bare) != "") == (name in silent)
