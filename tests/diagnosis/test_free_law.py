@@ -242,7 +242,7 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     assert found.verdict.word == "unknown" and found.verdict.probabilities[0][1] > 0.5
     unknown = found.unknown
     assert set(unknown.evidences) == {*FREEDOMS, *EMBEDDED} - {
-        name for name in FREEDOMS if FREEDOMS[name].in_dust
+        name for name in FREEDOMS if "undisturbed dust" in FREEDOMS[name].kinds
     }
     assert unknown.embedded == "force of depth"
     (law,) = unknown.laws

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import laws
 import numpy as np
@@ -46,6 +47,8 @@ RATE = Model(1300.0, (("strength_rate", {"eta": 0.05, "n": 0.5}),))
 def test_an_extended_model_is_part_of_the_simulation(place):
     """The gain is there when the model is applied: p_m comes out true, and the data are explained."""
     campaign = read_campaign(laws.write_campaign(place / "campaign-model", rate=0.05))
+    # or a scatter of 20 % would explain what the rate does
+    campaign = replace(campaign, sample=replace(campaign.sample, scatter=0.02))
     plain = calibrate(campaign, store=laws.LawStore(place / "store"))
     extended = calibrate(campaign, store=laws.LawStore(place / "store"), model=RATE)
     assert extended.fit.log_likelihood > plain.fit.log_likelihood + 20
