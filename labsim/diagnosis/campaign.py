@@ -41,6 +41,7 @@ from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, judge, weigh_prior
+from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, return_to_singles, settle_leading
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
@@ -85,12 +86,14 @@ class Judgement:
 class Diagnosis(Judgement):
     """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa.
 
-    untestable : beside what was found; combination : what is measured although they may be there.
+    untestable : beside what was found; combination : what is measured although they may be there. misfit : of the nominal fit,
+    every observation and every drop.
     """
 
     confusable: list[tuple[str, str, float]]
     untestable: list[Untestable]
     combination: Combination | None
+    misfit: tuple[list[Part], list[Part]]
     held_out_nominal: HeldOut
     held_out_extended: HeldOut
     gain: Gain
@@ -260,6 +263,7 @@ def diagnose_campaign(
         confusable=list_confusable(found.screening),
         untestable=untestable,
         combination=find_combination(bench, about, untestable),
+        misfit=measure_misfit(bench, nominal),
         held_out_nominal=held_nominal,
         held_out_extended=held_best,
         gain=measure_gain(held_nominal, held_best),

@@ -35,6 +35,10 @@ class Observation(Protocol):
         """What an unknown cause may change together: "drops", "map", "undisturbed dust", or a name of the kind's own."""
 
     @property
+    def name(self) -> str:
+        """What a person calls these data: "drops", "map C01"."""
+
+    @property
     def features(self) -> Sequence[RunFeatures]:
         """The runs it rests on; none where its data follow from the setting alone."""
 

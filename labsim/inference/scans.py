@@ -144,6 +144,10 @@ class CompactedZone:
     kind: str = "map"
 
     @property
+    def name(self) -> str:
+        return f"map {self.observed.name}"
+
+    @property
     def table(self) -> ResponseTable:
         return self.features[0].table
 

@@ -43,6 +43,7 @@ class Tracks:
     models: tuple[DropModel, ...]
     features: tuple[RunFeatures, ...]
     kind: str = "drops"
+    name: str = "drops"
 
     def begin(self) -> FloatArray:
         return np.array([model.start for model in self.models])

@@ -75,6 +75,7 @@ class Layering:
     dust: tuple[UndisturbedDust, ...]
     sigma: float
     kind: str = "undisturbed dust"
+    name: str = "undisturbed dust"
     features: tuple[RunFeatures, ...] = ()
 
     def begin(self) -> FloatArray:

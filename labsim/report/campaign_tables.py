@@ -10,6 +10,7 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
+from ..diagnosis.misfit import say_misfit
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..inference.calibrate import Calibration
@@ -129,6 +130,11 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "causes": causes,
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
+        "misfit": [
+            asdict(part)
+            | ({"drops": [asdict(drop) for drop in found.misfit[1]]} if part.kind == "drops" else {})
+            for part in found.misfit[0]
+        ],
         "not_testable": [
             {"cause": each.name, "trace_sigma": each.trace, "p_m_Pa": list(each.p_m)}
             for each in found.untestable
@@ -251,6 +257,8 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     lines.append(
         f"  nominal model: p = {found.p_value:.2g}; scatter between samples {found.scatter.mean:.3f} of ln p_m"
     )
+    if missed := say_misfit(*found.misfit):
+        lines.append(f"  the nominal model {missed}")
     for first, second, cosine in found.confusable[:4]:
         lines.append(f"  hard to tell apart here: {first} and {second} (cosine {cosine:+.2f})")
     lines += _say_untestable(found)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
+from ..diagnosis.misfit import say_misfit
 from .law_words import say_missing
 from .page import show_number
 from .phrases import SHOWN
@@ -46,6 +47,8 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
         "Posterior probabilities of every cause alone, of pairs where one is not enough, of the nominal model (none) and of a "
         "free law without a name (unknown); together they are one."
     )
+    if missed := say_misfit(*found.misfit):
+        words += f" The nominal fit {missed}."
     if found.verdict.word == "unknown":
         words += f" {_say_unknown(found)}"
     against = [f"{name}: {reason}" for name, reason in found.bench.reasons.items()]

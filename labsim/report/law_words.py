@@ -29,12 +29,15 @@ def is_embedded(found: Diagnosis) -> bool:
 
 def say_missing(found: Diagnosis) -> str:
     """What the unnamed law of the best fit does, or depends on, and how large it is; after ``what is missing``."""
-    unknown = found.unknown
+    unknown, (parts, _) = found.unknown, found.misfit
+    missed = [part.name for part in parts if part.missed]
+    if missed and not any(part.missed for part in parts if part.kind == "drops"):
+        return f"shows in {' and '.join(missed)} alone: p_m explains the drops"
     if not is_embedded(found):
         return "looks like " + MISSING[unknown.block].format(size=f"{100 * unknown.size:.0f}")
     first, *rest = _rank(found)
-    parts = [f"a {law.law.name}" for law in rest if _clearness(law) > CLEAR]
-    return f"acts like {say_law(first)}" + (f" (with parts of {' and '.join(parts)})" if parts else "")
+    further = [f"a {law.law.name}" for law in rest if _clearness(law) > CLEAR]
+    return f"acts like {say_law(first)}" + (f" (with parts of {' and '.join(further)})" if further else "")
 
 
 def comes_nearest(found: Diagnosis) -> bool:

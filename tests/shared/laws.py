@@ -92,12 +92,13 @@ def write_campaign(
     drops: list[tuple[float, float, float]] = DROPS,
     rate: float = 0.0,
     bent: float = 0.0,
+    seed: int = 7,
     name: str = "made up",
     description: str = "drops that obey a law",
     scan: bool = False,
 ) -> Path:
     """rate: strength_rate of the truth. bent: share of the depth by which all drops run ahead half way."""
-    rng = np.random.default_rng(7)
+    rng = np.random.default_rng(seed)
     folder.mkdir(parents=True)
     text = fill_in(CAMPAIGN, name=name, description=description)
     (folder / "campaign.toml").write_text(text, encoding="utf-8")

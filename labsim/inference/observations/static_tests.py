@@ -155,6 +155,7 @@ class StaticTests:
 
     tests: tuple[StrengthTest, ...]
     kind: str = "static tests"
+    name: str = "static tests"
     features: tuple[RunFeatures, ...] = ()
 
     def begin(self) -> FloatArray:

@@ -1,0 +1,115 @@
+"""Where a fit misses the data: which records, which maps and which part of them.
+
+χ² of an observation counts with its own errors, shared ones included; that of one drop among others, with all that it shares
+taken as its own. Small p values are rare for a true model.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..inference.fitting import DOUBTFUL, Fit
+from ..inference.scans import CompactedZone
+from ..inference.tracks import DropsBlock
+from ..inference.workbench import Workbench
+from ..records import FloatArray
+
+CLEAR = 3.0  # standard deviations of the mean of a region from which it is named
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of a map: measured minus simulated filling factor, mean over its cells, and its standard deviation."""
+
+    name: str
+    excess: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """One observation, or one drop of them all. regions : of a map, the clearest first."""
+
+    name: str
+    kind: str
+    chi_square: float
+    points: int
+    p_value: float
+    regions: tuple[Region, ...] = ()
+
+    @property
+    def missed(self) -> bool:
+        return self.p_value < DOUBTFUL
+
+
+def measure_misfit(bench: Workbench, fit: Fit) -> tuple[list[Part], list[Part]]:
+    """Every observation, and every drop by itself."""
+    parts, drops = [], []
+    for observation, block in zip(bench.observations, fit.blocks, strict=True):
+        free = 0
+        regions: tuple[Region, ...] = ()
+        if isinstance(block, DropsBlock):
+            free = 1 + len(fit.hypothesis) + 2 * len(block.sections)
+            for name, section in block.sections.items():
+                own = np.linalg.solve(
+                    np.linalg.cholesky(block.covariance[section, section]), block.residual[section]
+                )
+                drops.append(_rate(name, "drop", float(own @ own), own.size, 2))
+        elif isinstance(observation, CompactedZone):
+            regions = compare_regions(observation, block.residual, block.covariance)
+        part = _rate(observation.name, observation.kind, block.chi_square, block.residual.size, free, regions)
+        parts.append(part)
+    return parts, drops
+
+
+def _rate(
+    name: str, kind: str, chi_square: float, points: int, free: int, regions: tuple[Region, ...] = ()
+) -> Part:
+    return Part(name, kind, chi_square, points, float(chi2.sf(chi_square, max(points - free, 1))), regions)
+
+
+def compare_regions(zone: CompactedZone, residual: FloatArray, covariance: FloatArray) -> tuple[Region, ...]:
+    """What is left of a map under the tip, beside the bead, and above the level of the tip, the clearest first.
+
+    residual : (n + 1,) of the cells and the tip's depth; covariance : of both.
+    """
+    observed = zone.observed
+    found, radius = observed.reduced.map, observed.radius
+    r, z = (grid[observed.cells] for grid in np.meshgrid(found.r, found.z))
+    below = z < -found.tip_depth
+    regions = {
+        "under the tip": below & (r < radius),
+        "below, to the side": below & (r >= radius),
+        "beside the bead": ~below,
+    }
+    rated = []
+    for name, cells in regions.items():
+        if cells.any():
+            weight = np.append(cells / cells.sum(), 0.0)
+            sigma = math.sqrt(float(weight @ covariance @ weight))
+            rated.append(Region(name, float(weight @ residual), sigma))
+    return tuple(sorted(rated, key=lambda each: -abs(each.excess) / each.sigma))
+
+
+def say_misfit(parts: list[Part], drops: list[Part]) -> str:
+    """What is missed and what is met, in one sentence; empty where nothing is missed."""
+    missed = [part for part in parts if part.missed]
+    if not missed:
+        return ""
+    said = []
+    for part in missed:
+        text = f"{part.name} (χ² {part.chi_square:.0f} for {part.points} data"
+        if part.kind == "drops":
+            worst = [drop.name for drop in sorted(drops, key=lambda each: each.p_value) if drop.missed]
+            text += f", most {', '.join(worst[:3])}" if worst else ""
+        if part.regions and abs(part.regions[0].excess) > CLEAR * part.regions[0].sigma:
+            region = part.regions[0]
+            more = "denser" if region.excess > 0 else "looser"
+            text += f", {abs(region.excess):.3f} {more} than simulated {region.name}"
+        said.append(text + ")")
+    met = [part.name for part in parts if not part.missed]
+    return f"misses {', '.join(said)}" + (f"; it meets {', '.join(met)}" if met else "")
