@@ -8,6 +8,7 @@ import pytest
 from labsim.diagnosis.free_law import RecoveredLaw
 from labsim.diagnosis.hats import FreeLaw
 from labsim.diagnosis.judge import Verdict
+from labsim.diagnosis.misfit import Part
 from labsim.report.campaign_tables import say_verdict
 from labsim.report.law_words import say_missing, size_of_missing
 
@@ -27,7 +28,8 @@ def found():
     laws = (a_law(SPEED, [40.0, 10.0], 5.0), a_law(DEPTH, [-20.0, 205.0, 90.0], 30.0))
     evidences = {"force of speed": 276.0, "force of depth": 1448.0, "strength and forces": 1526.0}
     return SimpleNamespace(
-        unknown=SimpleNamespace(block="strength and forces", laws=laws, evidences=evidences, size=0.4)
+        unknown=SimpleNamespace(block="strength and forces", laws=laws, evidences=evidences, size=0.4),
+        misfit=([Part("drops", "drops", 300.0, 100, 1e-9)], []),
     )
 
 
@@ -37,6 +39,17 @@ def test_the_law_that_explains_most_by_itself_comes_first(found):
         "(with parts of a force of speed)"
     )
     assert size_of_missing(found) == ("+205 ± 30 Pa", "on the tip at a depth of 1 tip radius")
+
+
+def test_where_the_drops_are_met_nothing_is_said_of_a_law_in_them(found):
+    drops, scans = (
+        Part("drops", "drops", 90.0, 100, 0.7),
+        [Part(f"map C0{k}", "map", 900.0, 300, 0.0) for k in (1, 2)],
+    )
+    found.misfit = ([drops, *scans], [])
+    assert say_missing(found) == "shows in map C01 and map C02 alone: p_m explains the drops"
+    found.misfit = ([drops], [])  # nothing is missed by much: what competes says what it looks like
+    assert say_missing(found).startswith("acts like")
 
 
 def test_what_is_not_clear_is_not_named_beside_it(found):
