@@ -23,9 +23,9 @@ import pandas as pd
 from labsim.campaign import read_campaign
 from labsim.effects import Effect, list_effects
 from labsim.inference.blocks import Block
-from labsim.inference.drop_terms import USUAL_DEPTH, NumericalError, Terms
 from labsim.inference.grid import DEFAULT_CELLS, set_nominal_drop
-from labsim.inference.tracks import numerical_covariance
+from labsim.inference.observations.drop_terms import USUAL_DEPTH, NumericalError, Terms
+from labsim.inference.observations.tracks import numerical_covariance
 from labsim.sph import DropSetting, simulate
 
 DEPTH_BY_STRENGTH = -0.3  # d ln D / d ln p_m

@@ -17,10 +17,10 @@ from ..inference.calibrate import (
     warn_of_range,
     warn_unused_scans,
 )
-from ..inference.drop_terms import Terms
 from ..inference.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
 from ..inference.free_fall import doubt_scales
 from ..inference.measure import Measurements, measure
+from ..inference.observations.drop_terms import Terms
 from ..inference.posterior import Posterior
 from ..inference.runs import Progress, RunStore
 from ..inference.scatter import (

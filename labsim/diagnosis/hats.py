@@ -17,8 +17,8 @@ import numpy as np
 from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
 from ..inference.fitting import Fit
-from ..inference.scans import CompactedZone
-from ..inference.tracks import Tracks
+from ..inference.observations.compacted_zone import CompactedZone
+from ..inference.observations.tracks import Tracks
 from ..inference.workbench import Workbench
 from ..records import Campaign
 from ..sph import DropSetting

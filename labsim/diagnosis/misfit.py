@@ -13,8 +13,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..inference.fitting import DOUBTFUL, Fit
-from ..inference.scans import CompactedZone
-from ..inference.tracks import DropsBlock
+from ..inference.observations.compacted_zone import CompactedZone
+from ..inference.observations.tracks import DropsBlock
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 

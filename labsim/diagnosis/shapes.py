@@ -17,8 +17,8 @@ from scipy.optimize import minimize_scalar
 from ..effects import Effect, Parameter
 from ..inference.blocks import solve_globals
 from ..inference.fitting import Fit
+from ..inference.observations.undisturbed import Layering
 from ..inference.tangents import linearise_alone
-from ..inference.undisturbed import Layering
 from ..inference.workbench import Workbench
 from .screen import Screening
 

@@ -14,15 +14,15 @@ from ..effects import list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
 from ..records import Campaign
-from .drop_terms import Terms
 from .error_sizes import integrate_sizes
 from .fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
 from .free_fall import doubt_scales
 from .measure import Measurements, measure
+from .observations.compacted_zone import observe_scan
+from .observations.drop_terms import Terms
 from .open_workbench import open_workbench
 from .posterior import Posterior, sample
 from .runs import Progress, RunStore
-from .scans import observe_scan
 from .scatter import ScatterEstimate, allow_scatter, estimate_scatter, set_terms
 from .settle import list_large, settle
 from .surface_rows import doubt_surface_rows

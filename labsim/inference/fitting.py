@@ -15,9 +15,9 @@ from scipy.stats import chi2
 from ..records import FloatArray
 from .evidence import integrate_by_laplace
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
+from .observations.tracks import DropsBlock
 from .steps import Place, Solved, advance, hold, hold_strength, settle_nuisances, solve_at
 from .tangents import Blocks, linearise_at
-from .tracks import DropsBlock
 from .workbench import Workbench
 
 Hypothesis = tuple[str, ...]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from ..ct.reduce import ReducedScan, reduce_scan
 from ..errors import MeasurementError
 from ..records import Campaign
+from .observations.undisturbed import UndisturbedDust, observe_undisturbed
 from .observe import ObservedDrop, observe_drops
-from .undisturbed import UndisturbedDust, observe_undisturbed
 
 
 @dataclass

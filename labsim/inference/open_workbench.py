@@ -13,18 +13,17 @@ from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..sph import DropSetting
 from .curves import encode_run
-from .drop_model import make_drop_model
-from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import Family, RunGrid, few_positions, speed_nodes
-from .observation import Observation, RunFeatures
-from .observations import observe_further
+from .observations import Observation, RunFeatures, observe_further
+from .observations.compacted_zone import CompactedZone, ObservedScan, encode_scan_run
+from .observations.drop_model import make_drop_model
+from .observations.drop_terms import Terms
+from .observations.tracks import Tracks
+from .observations.undisturbed import Layering, UndisturbedDust
 from .observe import ObservedDrop, observe_drops
 from .runs import Progress, RunStore
-from .scans import CompactedZone, ObservedScan, encode_scan_run
 from .supported import refuse_others
-from .tracks import Tracks
-from .undisturbed import Layering, UndisturbedDust
 from .workbench import Workbench
 
 SCAN_MARGIN = 1.06

@@ -16,8 +16,8 @@ from scipy.linalg import solve_triangular
 from scipy.stats import halfnorm
 
 from ..records import Campaign, FloatArray
-from .drop_terms import Terms
 from .fitting import Fit, fit_hypothesis
+from .observations.drop_terms import Terms
 from .workbench import Workbench
 
 WIDTH = 0.05  # of the prior of the scatter of ln p_m, half-normal: sieved dust of one batch 2 %, poured soils 10 %

@@ -19,9 +19,9 @@ from ..records import STANDARD_GRAVITY, Drop, Track
 from ..sph.particles import initial_filling_factor
 from .forward import Instant, predict_depth
 from .measure import Measurements
+from .observations.undisturbed import UndisturbedDust
 from .observe import observe_drop
 from .truth import DRIFT, Hidden, TruthTable
-from .undisturbed import UndisturbedDust
 
 AFTER_STOP = 1.1  # frames kept, in stopping times
 CONTACT = 3.5e-3  # s after the first frame

@@ -7,8 +7,8 @@ from functools import partial
 
 from ..records import FloatArray
 from .blocks import Block
-from .drop_terms import Probe
-from .observation import Observation
+from .observations import Observation
+from .observations.drop_terms import Probe
 from .workbench import Workbench
 
 Blocks = tuple[Block, ...]  # one an observation, in the workbench's order

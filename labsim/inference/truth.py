@@ -22,8 +22,8 @@ from .curves import encode_run
 from .forward import ResponseTable
 from .grid import set_nominal_drop
 from .nodes import place_strength
+from .observations.compacted_zone import see_dust
 from .runs import Progress, RunStore
-from .scans import see_dust
 
 TRUTH_CELLS, TRUTH_SCAN_CELLS = 6, 10
 SPEED_ANCHOR, SPEED_RATIO = 0.13, 1.6

@@ -13,7 +13,6 @@ from ..effects.model import Model, make_instrument
 from ..errors import InferenceError
 from ..records import Campaign, FloatArray, Projectile
 from ..sph import DropSetting
-from .drop_terms import Terms
 from .forward import ResponseTable
 from .grid import (
     COARSE_CELLS,
@@ -23,11 +22,12 @@ from .grid import (
     RunGrid,
 )
 from .nodes import amplitude_nodes, enclosing_nodes, screening_node
-from .observation import Observation, RunFeatures
+from .observations import Observation, RunFeatures
+from .observations.compacted_zone import CompactedZone
+from .observations.drop_terms import Terms
+from .observations.tracks import Tracks
+from .observations.undisturbed import Layering, UndisturbedDust
 from .observe import ObservedDrop
-from .scans import CompactedZone
-from .tracks import Tracks
-from .undisturbed import Layering, UndisturbedDust
 
 
 @dataclass

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.drop_model import DropModel
 from ..inference.fitting import Fit
 from ..inference.forward import Instant, predict_depth
+from ..inference.observations.drop_model import DropModel
 from ..inference.workbench import Workbench
 from ..records import FloatArray, Projectile
 

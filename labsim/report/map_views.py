@@ -11,7 +11,7 @@ import numpy as np
 from ..ct.reduce import reduce_scan
 from ..errors import MeasurementError
 from ..inference.fitting import Fit
-from ..inference.scans import CompactedZone
+from ..inference.observations.compacted_zone import CompactedZone
 from ..inference.workbench import Workbench
 from ..records import Campaign, FillingMap, FloatArray
 

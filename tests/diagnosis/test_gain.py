@@ -9,7 +9,7 @@ from scipy.stats import kstest, multivariate_normal
 
 from labsim.diagnosis.gain import HeldOut, check_prediction, measure_gain, predict_held_out
 from labsim.inference.blocks import Block
-from labsim.inference.tracks import DropsBlock
+from labsim.inference.observations.tracks import DropsBlock
 
 POINTS, DROPS, WIDE, SCALE = 6, 5, 100.0, 0.3
 NAMES = [f"D{k:02d}" for k in range(1, DROPS + 1)]

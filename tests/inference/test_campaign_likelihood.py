@@ -13,9 +13,9 @@ from labsim.inference.evidence import log_share_inside
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.nodes import enclosing_nodes
+from labsim.inference.observations.compacted_zone import Block
 from labsim.inference.observe import observe_drop
 from labsim.inference.posterior import measure_residual, sample
-from labsim.inference.scans import Block
 from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
 from labsim.video.synthetic import evaluate_motion

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from labsim.effects import Normal, Parameter
 from labsim.inference import error_sizes
 from labsim.inference.blocks import Block
-from labsim.inference.drop_terms import Terms
+from labsim.inference.observations.drop_terms import Terms
 
 MIDDLE, NOISE, POINTS = math.log(1200.0), 0.01, 40
 PARAMETER = Parameter("amount", "1", 0.0, (-10.0, 10.0), Normal(0.0, 2.0), 1.0, "of a test")

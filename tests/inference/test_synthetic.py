@@ -11,7 +11,7 @@ from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import reduce_scan
 from labsim.errors import SimulationError
 from labsim.inference.curves import encode_run
-from labsim.inference.scans import see_dust
+from labsim.inference.observations.compacted_zone import see_dust
 from labsim.inference.synthetic import QUIET, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.sph import simulate

@@ -12,10 +12,10 @@ from labsim.ct.reduce import reduce_scan
 from labsim.diagnosis.shapes import lay_out_shapes, shape_parameter
 from labsim.effects import list_effects
 from labsim.inference.measure import Measurements, measure
+from labsim.inference.observations.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.inference.open_workbench import open_workbench
 from labsim.inference.runs import RunStore
 from labsim.inference.tangents import linearise_alone
-from labsim.inference.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.records import Scan
 
 DEPTH = np.arange(1.6e-4, 3.3e-3, 8e-5)

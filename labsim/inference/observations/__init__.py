@@ -1,7 +1,12 @@
-"""Kinds of measurement beside drops and scans: one file each, here or in a campaign's ``observations/``, found by listing.
+"""What a fit knows of the data, whatever instrument took them; and the kinds of measurement, one file each.
 
-A file has ``observe(campaign)``, which reads what the campaign's folder holds of its kind and returns an Observation
-(inference/observation.py), or None where there is nothing.
+Data that share no error with the rest are one Observation: all drops of a campaign (``tracks``: cameras and the solver err alike
+in them), each map of compacted dust (``compacted_zone``), the undisturbed dust of all scans (``undisturbed``), static tests
+(``static_tests``). Fits, screening and judging ask nothing else of them than what stands here.
+
+A further kind is one file here, or in a campaign's ``observations/``, found by listing: ``observe(campaign)`` reads what the
+campaign's folder holds of it and returns an Observation, or None where there is nothing. Drops and scans come measured already
+(inference/measure.py), so their files have none.
 """
 
 from __future__ import annotations
@@ -9,14 +14,64 @@ from __future__ import annotations
 import hashlib
 import importlib
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any, Protocol
 
 from ...errors import InferenceError, LabsimError
-from ...records import Campaign
+from ...records import Campaign, FloatArray
 from ...sph.plugins import load_module
-from ..observation import Observation
+from ..blocks import Block
+from ..forward import ResponseTable
+from .drop_terms import Probe, Terms
+
+
+@dataclass(frozen=True)
+class RunFeatures:
+    """Runs of one family, (number ``family``), as an observation takes them. encode : the part of a run that it reads -> (m,)
+    features, smooth in ln speed and ln p_m; table : what keeps and interpolates them."""
+
+    family: int
+    table: ResponseTable
+    encode: Callable[[Any], FloatArray]
+
+
+class Observation(Protocol):
+    """Data whose errors are their own. Nuisances are arrays of the observation's own shape; an empty one where it has none."""
+
+    @property
+    def kind(self) -> str:
+        """What an unknown cause may change together: "drops", "map", "undisturbed dust", or a name of the kind's own."""
+
+    @property
+    def name(self) -> str:
+        """What a person calls these data: "drops", "map C01"."""
+
+    @property
+    def features(self) -> Sequence[RunFeatures]:
+        """The runs it rests on; none where its data follow from the setting alone."""
+
+    def begin(self) -> FloatArray:
+        """Nuisances as stated, where a fit begins."""
+
+    def linearise(
+        self,
+        nuisances: FloatArray,
+        log_p_m: float,
+        nominal: Probe,
+        terms: Terms,
+        probes: Mapping[str, Probe],
+    ) -> Block:
+        """Residual, covariance and tangents about the point ``nominal``; probes : name of a global -> the point after a step of
+        it, for its tangent by finite differences."""
+
+    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
+        """Nuisances at their best as seen from ``block``, and the largest move (1 is a prior width or a frame).
+
+        weighted : (n,) inverse covariance times what is left of the residual.
+        """
 
 
 def list_own_files(folder: Path) -> list[Path]:
@@ -31,6 +86,10 @@ def observe_further(campaign: Campaign) -> list[Observation]:
     """
     found = []
     for module in _list_kinds(campaign.folder):
+        if not hasattr(module, "observe"):
+            if module.__name__.startswith(__name__):
+                continue  # drops and scans, and what they are made of
+            raise InferenceError(module.__file__ or "", "observe", "is missing; write def observe(campaign)")
         try:
             observation = module.observe(campaign)
         except LabsimError:

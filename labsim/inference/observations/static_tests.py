@@ -20,8 +20,8 @@ from ...errors import InferenceError
 from ...records import Campaign, FloatArray, Material, StrengthTest
 from ...sph.materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths
 from ..blocks import Block
-from ..drop_terms import Probe, Terms
-from ..observation import RunFeatures
+from . import RunFeatures
+from .drop_terms import Probe, Terms
 
 PARAMETERS = {  # of each kind's own curve, with units
     "compression_omnidirectional": (("p_m", "Pa"), ("phi_1", "1"), ("phi_2", "1"), ("delta", "1")),

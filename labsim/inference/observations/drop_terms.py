@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects import Instrument
-from ..records import STANDARD_GRAVITY, FloatArray
-from ..sph import DropSetting
+from ...effects import Instrument
+from ...records import STANDARD_GRAVITY, FloatArray
+from ...sph import DropSetting
+from ..forward import Instant
 from .drop_model import FREE, SPEED_WIDTH, DropModel
-from .forward import Instant
 
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error

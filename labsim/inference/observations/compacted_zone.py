@@ -16,16 +16,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..ct.project import project
-from ..ct.reduce import ReducedScan
-from ..effects import Instrument
-from ..records import FillingMap, FloatArray, Scan
-from ..sph import DropRun
-from .blocks import Block
+from ...ct.project import project
+from ...ct.reduce import ReducedScan
+from ...effects import Instrument
+from ...records import FillingMap, FloatArray, Scan
+from ...sph import DropRun
+from ..blocks import Block
+from ..forward import ResponseTable
+from ..run_parts import Compaction
+from . import RunFeatures
 from .drop_terms import Probe, Terms
-from .forward import ResponseTable
-from .observation import RunFeatures
-from .run_parts import Compaction
 from .undisturbed import GREY, observe_undisturbed
 
 LIFT = 60e-6  # m, of the bead at rest over its lowest point

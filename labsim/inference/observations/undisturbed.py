@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ct.reduce import ReducedScan
-from ..records import FloatArray, Scan
-from ..sph.particles import initial_filling_factor
-from .blocks import Block
+from ...ct.reduce import ReducedScan
+from ...records import FloatArray, Scan
+from ...sph.particles import initial_filling_factor
+from ..blocks import Block
+from . import RunFeatures
 from .drop_terms import Probe, Terms
-from .observation import RunFeatures
 
 REACH = 3.0  # tip radii about the bead and its path within which dust may have moved
 SMOOTH, SMOOTH_LENGTH = 3e-4, 3e-4  # of the filling factor; m

@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..records import FloatArray
-from .blocks import Block
+from ...records import FloatArray
+from ..blocks import Block
+from ..forward import Instant
+from . import RunFeatures
 from .drop_model import DropModel
 from .drop_terms import DropTerms, NumericalError, Probe, Terms, linearise_drop
-from .forward import Instant
-from .observation import RunFeatures
 
 
 @dataclass(frozen=True)

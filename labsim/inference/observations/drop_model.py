@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects import Instrument
-from ..records import Camera, FloatArray
-from .forward import Instant, ResponseTable, predict_depth, predict_speed
-from .observe import ObservedDrop
+from ...effects import Instrument
+from ...records import Camera, FloatArray
+from ..forward import Instant, ResponseTable, predict_depth, predict_speed
+from ..observe import ObservedDrop
 
 BIN = 8  # frames of free fall averaged into one point
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
