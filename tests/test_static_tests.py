@@ -113,8 +113,8 @@ def test_what_a_test_contradicts_is_odd(folder, capsys):
         main(["check", str(folder), "--json"])
     odd = json.loads(capsys.readouterr().out)["warnings"]
     assert [re.split(r":| by ", line)[:2] for line in odd] == [
-        ["S02", " the stress falls"],
-        ["S03", " rows scatter"],
+        ["strength/S02", " the stress falls"],
+        ["strength/S03", " rows scatter"],
     ]
 
 
