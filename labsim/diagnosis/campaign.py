@@ -15,6 +15,7 @@ from ..inference.calibrate import (
     prepare,
     sample_fit,
     warn_of_range,
+    warn_unsettled,
     warn_unused_scans,
 )
 from ..inference.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
@@ -254,9 +255,12 @@ def diagnose_campaign(
     )
     about = best if found.verdict.word == "effect" else nominal
     untestable = list_untestable(bench, about)
-    doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
+    doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal) + warn_unsettled(nominal)]
     if best is not nominal:
-        doubts += [f"with {' + '.join(best.hypothesis)}: {text}" for text in warn_of_range(bench, best)]
+        doubts += [
+            f"with {' + '.join(best.hypothesis)}: {text}"
+            for text in warn_of_range(bench, best) + warn_unsettled(best)
+        ]
     doubts += doubt_scales(seen.drops)
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},

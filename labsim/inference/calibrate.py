@@ -30,6 +30,7 @@ from .target import make_target
 from .workbench import Workbench
 
 LEANS = 2.0  # standard errors of ln p_m from an end of its range: one in twenty of the Gaussian is cut off from there on
+UNSETTLED = 0.5  # standard deviations of a parameter
 AT = 0.1  # the same, that nobody would tell from none
 LOST = 1e-6  # p value of a nominal fit that is not believed
 STATIC = "static_strength"  # nobody knows beforehand that dust at rest is as strong as in a drop
@@ -155,7 +156,7 @@ def calibrate(
         )
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     p_value = goodness_of_fit(fit)
-    doubts += warn_of_range(bench, fit) + doubt_scales(bench.drops)
+    doubts += warn_of_range(bench, fit) + warn_unsettled(fit) + doubt_scales(bench.drops)
     if p_value < DOUBTFUL:
         doubts.append(
             f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
@@ -175,6 +176,16 @@ def calibrate(
         (*doubts, *warn_unused_scans(bench)),
         len(doubts),
     )
+
+
+def warn_unsettled(fit: Fit) -> list[str]:
+    """A line where a fit ended before it was at its best."""
+    if fit.unsettled < UNSETTLED:
+        return []
+    return [
+        f"the fit still asks for a step of {fit.unsettled:.1f} standard deviations: runs about it do not lie on one smooth "
+        "curve, or there were too few steps; its numbers are no best fit"
+    ]
 
 
 def warn_of_range(bench: Workbench, fit: Fit) -> list[str]:

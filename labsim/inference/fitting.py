@@ -10,13 +10,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.stats import chi2
 
 from ..records import FloatArray
 from .evidence import integrate_by_laplace
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
 from .observations.tracks import DropsBlock
-from .steps import Place, Solved, advance, hold, hold_strength, settle_nuisances, solve_at
+from .steps import Place, Solved, advance, hold, hold_strength, settle_nuisances, solve_at, stop_at_limits
 from .tangents import Blocks, linearise_at
 from .workbench import Workbench
 
@@ -35,6 +36,7 @@ class Fit:
     """One hypothesis, fitted. values : name of effect -> amplitude (parameter minus null, in the parameter's unit).
 
     covariance : of (ln p_m, amplitudes in order); evidence : ln of the integrated likelihood (Laplace), priors included.
+    unsettled : the step that it still asks for, the largest of its parameters', in standard deviations.
     """
 
     hypothesis: Hypothesis
@@ -49,6 +51,7 @@ class Fit:
     nuisances: tuple[FloatArray, ...]  # of every observation, at their best
     # of ln p_m over the shapes of the effect that were fitted, by their evidence: mean minus this one's, standard deviation
     over_shapes: tuple[float, float] = (0.0, 0.0)
+    unsettled: float = 0.0
 
     @property
     def drops(self) -> DropsBlock:
@@ -108,6 +111,7 @@ def fit_hypothesis(
     assert best is not None
     if not (settled or calm):
         best = settle_nuisances(bench, best, MOST_NUISANCES)
+    step = np.abs(stop_at_limits(bench, best)[0]) / np.sqrt(np.diag(best.covariance))
     return Fit(
         hypothesis,
         best.place.log_p_m,
@@ -119,6 +123,7 @@ def fit_hypothesis(
         integrate_by_laplace(bench, best),
         best.blocks,
         best.place.nuisances,
+        unsettled=float(step.max()),
     )
 
 

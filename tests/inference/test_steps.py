@@ -10,6 +10,7 @@ from scipy.integrate import dblquad
 from labsim.effects import Normal, Parameter
 from labsim.inference import fitting, steps
 from labsim.inference.blocks import Block
+from labsim.inference.calibrate import warn_unsettled
 
 RANGE = (300.0, 6000.0)
 
@@ -53,6 +54,7 @@ def test_a_step_that_leads_away_is_halved(monkeypatch):
     fit = fitting.fit_hypothesis(bench, (), (middle + 0.33, {}))
     assert fit.log_p_m == pytest.approx(middle, abs=1e-4)
     assert fit.chi_square < 1e-3
+    assert fit.unsettled < 0.05 and not warn_unsettled(fit)
 
 
 def test_plain_steps_run_away_there(monkeypatch):
@@ -60,6 +62,7 @@ def test_plain_steps_run_away_there(monkeypatch):
     monkeypatch.setattr(fitting, "LOWER", math.inf)
     fit = fitting.fit_hypothesis(bench, (), (middle + 0.33, {}))
     assert abs(fit.log_p_m - middle) > 0.3
+    assert fit.unsettled > 1.0 and warn_unsettled(fit)[0].startswith("the fit still asks for a step of")
 
 
 def test_a_start_that_is_too_low_is_not_followed(monkeypatch):
