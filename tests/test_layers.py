@@ -10,7 +10,7 @@ import labsim
 ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
-    {"text_files"},
+    {"text_files", "extensions"},
     {"tables", "tiff_pages", "tracks"},
     {"video", "ct", "sph"},  # siblings that never import each other
     {"own_keys"},

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
 
 from ..errors import LabsimError, MeasurementError
+from ..extensions import list_modules
 from ..tiff_pages import check_size
 
 KEPT_IN_MEMORY = 256 * 2**20  # bytes; larger stacks are read again for every pass over them
@@ -81,11 +81,9 @@ class SliceStack:
         return (self.slice(k) for k in range(self.count))
 
 
-def list_formats() -> list[str]:
-    """Names of the files in ``formats``, each one format."""
-    from . import formats
-
-    return sorted(info.name for info in pkgutil.iter_modules(formats.__path__))
+def list_formats() -> dict[str, ModuleType]:
+    """Modules of ``labsim/ct/formats`` and of other packages by name, each one format."""
+    return list_modules(f"{__package__}.formats", "labsim.ct_formats")
 
 
 def open_stack(path: Path | str) -> SliceStack:
@@ -96,10 +94,9 @@ def open_stack(path: Path | str) -> SliceStack:
     path = Path(path)
     if not path.exists():
         raise MeasurementError(path, "scan.slices", "does not exist; name the folder or file of the slices")
-    names = list_formats()
-    for name in names:
-        module = importlib.import_module(f"{__package__}.formats.{name}")
-        if module.recognise(path):
+    modules = list_formats()
+    for module in modules.values():
+        if module.recognises(path):
             stack: SliceStack = module.open_stack(path)
             check_size(path, "scan.slices", *stack.shape)
             if stack.packed and stack.bytes > max(KEPT_IN_MEMORY, MOST_PACKED * stack.packed):
@@ -113,7 +110,7 @@ def open_stack(path: Path | str) -> SliceStack:
     raise MeasurementError(
         path,
         "scan.slices",
-        f"holds no slices in a known format ({', '.join(names)}); export 8- or 16-bit TIFF",
+        f"holds no slices in a known format ({', '.join(modules)}); export 8- or 16-bit TIFF",
     )
 
 

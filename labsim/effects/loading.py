@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import EffectError
+from ..extensions import list_files
 from ..records import (
     STANDARD_GRAVITY,
     Camera,
@@ -44,6 +45,7 @@ def list_effects(campaign: Campaign | Path | str | None = None) -> dict[str, Eff
     laboratory) or None (the catalogue, ditto). Raises EffectError naming the file that breaks the contract.
     """
     files = _list_files(CATALOGUE)
+    files |= list_files("labsim.effects", files)
     folder = campaign.folder if isinstance(campaign, Campaign) else Path(campaign) if campaign else None
     if folder is not None:
         for name, file in list_own_files(folder).items():

@@ -7,8 +7,6 @@ listed, so a new format is one new file (docs/extend.md). ``table`` reads labsim
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -17,6 +15,7 @@ from types import ModuleType
 import numpy as np
 
 from ..errors import MeasurementError
+from ..extensions import list_modules
 from ..records import Camera, FloatArray
 
 OFF_FRAME = 0.2  # frames by which a time may miss the nearest frame of the stated rate
@@ -65,10 +64,9 @@ class TrackRows:
 
 
 def list_formats() -> dict[str, ModuleType]:
-    """Modules of this folder that are formats, by name; the general one last."""
-    names = sorted(info.name for info in pkgutil.iter_modules(__path__))
-    found = {name: importlib.import_module(f".{name}", __package__) for name in names}
-    formats = [name for name in names if hasattr(found[name], "recognises")]
+    """Modules that are formats, of this folder and of other packages, by name; the general one last."""
+    found = list_modules(__name__, "labsim.track_formats")
+    formats = [name for name in found if hasattr(found[name], "recognises")]
     return {name: found[name] for name in sorted(formats, key=lambda name: hasattr(found[name], "GENERAL"))}
 
 

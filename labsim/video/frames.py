@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
-import pkgutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from ..errors import MeasurementError
+from ..extensions import list_modules
 from ..records import FloatArray
 
 MAX_KEPT_BYTES = 120_000_000
@@ -105,11 +105,10 @@ class Frames:
         )
 
 
-def list_formats() -> dict[str, object]:
-    """Modules of ``labsim/video/formats`` by name; each has NAME, ``recognises(path)`` and ``open_file(path)``."""
-    package = importlib.import_module(".formats", __package__)
-    names = sorted(info.name for info in pkgutil.iter_modules(package.__path__))
-    return {name: importlib.import_module(f".formats.{name}", __package__) for name in names}
+def list_formats() -> dict[str, ModuleType]:
+    """Modules of ``labsim/video/formats`` and of other packages by name; each has NAME, ``recognises(path)`` and
+    ``open_file(path)``."""
+    return list_modules(f"{__package__}.formats", "labsim.video_formats")
 
 
 def open_frames(path: Path | str) -> Frames:
@@ -121,10 +120,10 @@ def open_frames(path: Path | str) -> Frames:
         raise MeasurementError(path, "video", "is empty (0 bytes); copy or record it again")
     formats = list_formats()
     for module in formats.values():
-        if module.recognises(path):  # type: ignore[attr-defined]
-            frames = module.open_file(path)  # type: ignore[attr-defined]
+        if module.recognises(path):
+            frames: Frames = module.open_file(path)
             if frames.count < 1:
                 raise MeasurementError(path, "video", "holds no frame; record or export it again")
             return frames
-    known = "; ".join(module.NAME for module in formats.values())  # type: ignore[attr-defined]
+    known = "; ".join(module.NAME for module in formats.values())
     raise MeasurementError(path, "video", f"is of no known format; labsim reads {known}")

@@ -12,7 +12,7 @@ from ..stack import SliceStack
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".nx", ".nxs")
 
 
-def recognise(path: Path) -> bool:
+def recognises(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in SUFFIXES
 
 

@@ -19,7 +19,7 @@ from ..stack import SliceStack
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp")
 
 
-def recognise(path: Path) -> bool:
+def recognises(path: Path) -> bool:
     return path.is_dir() and any(item.suffix.lower() in SUFFIXES for item in path.iterdir())
 
 

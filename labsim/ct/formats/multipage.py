@@ -12,7 +12,7 @@ from ...tiff_pages import count_pages
 from ..stack import SliceStack
 
 
-def recognise(path: Path) -> bool:
+def recognises(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in (".tif", ".tiff")
 
 

@@ -12,8 +12,6 @@ campaign's folder holds of it and returns an Observation, or None where there is
 from __future__ import annotations
 
 import hashlib
-import importlib
-import pkgutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from ...errors import InferenceError, LabsimError
+from ...extensions import list_modules
 from ...records import Campaign, FloatArray
 from ...sph.plugins import load_module
 from ..blocks import Block
@@ -106,8 +105,7 @@ def observe_further(campaign: Campaign) -> list[Observation]:
 
 
 def _list_kinds(folder: Path) -> Iterator[ModuleType]:
-    for info in pkgutil.iter_modules(__path__):
-        yield importlib.import_module(f"{__name__}.{info.name}")
+    yield from list_modules(__name__, "labsim.observations").values()
     for file in list_own_files(folder):
         try:
             content = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
