@@ -184,14 +184,14 @@ def sample(
         sample_stats={"lp": np.swapaxes(sampler.get_log_prob(discard=discard), 0, 1)},
     )
     quarters = groups.reshape(4, -1, d) if walkers % 4 == 0 else groups
-    with _uncompiled(arviz.Numba):
+    with uncompiled(arviz.Numba):
         r_hat = max(float(arviz.rhat(quarters[:, :, k])) for k in range(d))
     total = chain.shape[0] * walkers
     return Posterior(tuple(names), data, r_hat, total / tau, int(chain.shape[0]), tau)
 
 
 @contextmanager
-def _uncompiled(numba: Any) -> Iterator[None]:
+def uncompiled(numba: Any) -> Iterator[None]:
     """Within it arviz leaves its functions uncompiled: to compile one takes longer than all it is called for here."""
     before, numba.numba_flag = numba.numba_flag, False
     try:

@@ -20,7 +20,7 @@ from ..records import Campaign, Drop, FloatArray
 from ..sph import DropRun, DropSetting
 from .emulator import Emulator, fit_emulator
 from .planar import SPACING, campaign_setting
-from .posterior import Posterior
+from .posterior import Posterior, uncompiled
 from .published import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
 from .readings import FigureLikelihood, NumericalError, Reading, integrate_reading, list_readings
 from .runs import Progress, RunStore, require_stopped
@@ -213,11 +213,13 @@ def _sample(
         sample_stats={"lp": np.swapaxes(sampler.get_log_prob(discard=discard), 0, 1)},
         attrs={"unit": "Pa", "prior": f"flat in ln p_m between {limits[0]:g} and {limits[1]:g} Pa"},
     )
+    with uncompiled(arviz.Numba):
+        r_hat, ess = (float(each(data)["p_m_Pa"]) for each in (arviz.rhat, arviz.ess))
     return Posterior(
         names=("p_m_Pa",),
         data=data,
-        r_hat=float(arviz.rhat(data)["p_m_Pa"]),
-        ess=float(arviz.ess(data)["p_m_Pa"]),
+        r_hat=r_hat,
+        ess=ess,
         steps=steps,
         autocorrelation=float(sampler.get_autocorr_time(discard=discard, quiet=True)[0]),
     )
