@@ -1,6 +1,6 @@
 """Hats: the pieces that a law left free in the equations is made of, each a change of the setting like an effect's.
 
-They never stand in the catalogue. What fits them: free_law.py; equations: docs/diagnosis.md "The free law".
+They never stand in the catalogue. What fits them: free_law.py; equations: docs/free-law.md.
 """
 
 from __future__ import annotations

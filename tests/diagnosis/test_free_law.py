@@ -249,7 +249,7 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     place = np.linspace(0.0, 2.0, 201)
     mean, sigma = law.at(place)
     assert place[np.argmax(mean)] == pytest.approx(MIDDLE, abs=0.25)
-    # its size is not asserted: the prior shrinks a lone hat, and p_m takes what is common to all depths (docs/diagnosis.md)
+    # its size is not asserted: the prior shrinks a lone hat, and p_m takes what is common to all depths (docs/free-law.md)
     peak = int(np.argmax(mean))
     assert mean[peak] > 1.5 * sigma[peak]
     assert not any(name in found.bench.effects for law in LAWS for name in law.hats)
