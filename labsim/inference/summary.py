@@ -196,7 +196,7 @@ def _sample(
         inside = (ln_p_m >= low) & (ln_p_m <= high)
         return np.where(inside, likelihood(np.clip(ln_p_m, low, high)), -np.inf)
 
-    walkers, steps, discard = 32, 2800, 300
+    walkers, steps, discard = 32, 1500, 200
     random = np.random.default_rng(seed)
     start = random.uniform(low, high, (walkers, 1))
     sampler = emcee.EnsembleSampler(walkers, 1, log_probability, vectorize=True)
