@@ -255,7 +255,9 @@ def diagnose_campaign(
     )
     about = best if found.verdict.word == "effect" else nominal
     untestable = list_untestable(bench, about)
-    doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal) + warn_unsettled(nominal)]
+    doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
+    if best is nominal:  # one that fails has no best worth to be at
+        doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]
     if best is not nominal:
         doubts += [
             f"with {' + '.join(best.hypothesis)}: {text}"

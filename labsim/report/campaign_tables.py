@@ -60,6 +60,8 @@ def _name_calibrated(samples: FloatArray) -> dict[str, Any]:
 def campaign_calibration_lines(found: Calibration) -> str:
     p_m = summarise(found.posterior.samples("p_m_Pa"))
     drops, scans = len(found.bench.tracks.models), len(found.bench.scans)
+    others = [each.name for each in found.bench.observations if each.kind not in ("drops", "map")]
+    beside = "".join(f", {name}" for name in others)
     lines = [
         *_say_doubts(found),
         f"{found.campaign.name}: p_m = {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa "
@@ -69,7 +71,7 @@ def campaign_calibration_lines(found: Calibration) -> str:
         q = summarise(found.posterior.samples(name))
         lines.append(f"  {name} = {q['mean']:.4g} ± {q['sd']:.2g}")
     lines += [
-        f"  {drops} drop{'s' * (drops != 1)}, {scans} scan{'s' * (scans != 1)}; χ² {found.fit.chi_square:.0f} for "
+        f"  {drops} drop{'s' * (drops != 1)}, {scans} scan{'s' * (scans != 1)}{beside}; χ² {found.fit.chi_square:.0f} for "
         f"{found.fit.points} data (p = {found.p_value:.2g})",
         f"  scatter of ln p_m from sample to sample {found.scatter.mean:.3f} ± {found.scatter.sd:.3f}"
         f" ({found.bench.terms.scatter:.2g} in use)",
