@@ -121,6 +121,12 @@ def test_every_section_in_order_with_its_numbers(name: str, request: pytest.Fixt
         assert warning in text
     best = diagnosis["causes"][0]
     assert f"{best['probability']:.3f}" in text
+    for each in diagnosis["not_testable"]:
+        low, high = (p / 1e3 for p in each["p_m_Pa"])
+        assert each["cause"] in text and f"{low:.3g} to {high:.3g}" in text
+    missed = [part["name"] for part in diagnosis["misfit"] if part["p_value"] < 0.05]
+    assert ("The nominal fit misses" in text) == bool(missed) and all(name in text for name in missed)
+    assert [part["name"] for part in diagnosis["misfit"]][0] == "drops"
     figures = json.loads(page.scripts[0])
     drawn = [a["data-figure"] for a in page.all("div") if "data-figure" in a]
     assert sorted(drawn) == sorted(figures), "every figure has its place and every place its figure"
