@@ -70,7 +70,8 @@ def read_campaign(folder: Path | str) -> Campaign:
     read_scans = [read_scan(path) for path in list_parts(folder / "ct", "scan.toml")]
     scans = tuple(scan for scan in read_scans if isinstance(scan, Scan))
     _check_sequence(folder, drops)
-    refuse_repeated_records(folder, drops, scans)
+    strength_tests = read_strength_tests(folder, sample)
+    refuse_repeated_records(folder, drops, scans, strength_tests)
     for wanted in planar.calibration_drops:
         if wanted not in {drop.name for drop in drops}:
             raise CampaignError(
@@ -93,7 +94,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         published_scans=tuple(scan for scan in read_scans if isinstance(scan, PublishedScan)),
         planar=planar,
         source=source,
-        strength_tests=read_strength_tests(folder, sample),
+        strength_tests=strength_tests,
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -189,7 +189,8 @@ class Planar:
     box_radius: float = 0.55e-3  # m, the radius that the box belongs to
 
 
-STRENGTH_KINDS = ("compression_omnidirectional", "compression_unidirectional", "tension", "shear")
+StrengthKind = Literal["compression_omnidirectional", "compression_unidirectional", "tension", "shear"]
+STRENGTH_KINDS: tuple[StrengthKind, ...] = get_args(StrengthKind)
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,7 @@ class StrengthTest:
     """One static test of the dust. points : (filling factor, stress in Pa) of each row; relative_sigma : of the stress."""
 
     name: str
-    kind: Literal["compression_omnidirectional", "compression_unidirectional", "tension", "shear"]
+    kind: StrengthKind
     points: tuple[tuple[float, float], ...]
     relative_sigma: float
     source: dict = field(default_factory=dict)  # strength.toml [source] as written

@@ -1,4 +1,4 @@
-"""The same record filed twice: two drops or scans that cannot both be measurements, and would count as two.
+"""The same record filed twice: two drops, scans or tests that cannot both be measurements, and would count as two.
 
 Noise never repeats, so that rows which agree to the last digit, or files which agree to the last byte, are one measurement.
 """
@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from .errors import CampaignError, MeasurementError
-from .records import Drop, Scan
+from .records import Drop, Scan, StrengthTest
 from .tracks import read_rows
 
 
-def refuse_repeated_records(campaign: Path, drops: Sequence[Drop], scans: Sequence[Scan]) -> None:
-    """Raise CampaignError where two drops or two scans are one measurement.
+def refuse_repeated_records(
+    campaign: Path, drops: Sequence[Drop], scans: Sequence[Scan], tests: Sequence[StrengthTest]
+) -> None:
+    """Raise CampaignError where two drops, two scans or two strength tests are one measurement.
 
     Tracks are compared by their rows, whatever their frame numbers, columns, digits and line ends (one file of another program
     may hold the tracks of several drops); videos, pictures and slices byte for byte.
@@ -32,6 +34,11 @@ def refuse_repeated_records(campaign: Path, drops: Sequence[Drop], scans: Sequen
     _compare_files([(toml, path) for toml, path, _ in videos], "record.file")
     slices = [(campaign / "ct" / scan.name / "scan.toml", scan.slices) for scan in scans]
     _compare_files(slices, "scan.slices")
+    seen: dict[tuple[tuple[float, float], ...], str] = {}
+    for test in tests:
+        if (earlier := seen.setdefault(test.points, test.name)) != test.name:
+            toml = campaign / "strength" / test.name / "strength.toml"
+            raise CampaignError(toml, "test.file", f"holds the rows of {earlier}; remove one of the two")
 
 
 def _compare_rows(tracks: Sequence[tuple[Path, Path, Drop]]) -> None:

@@ -14,8 +14,6 @@ from ..records import STRENGTH_KINDS
 from ..text_files import load_json
 from . import options
 
-DOUBTFUL = 0.01  # p value of a fit below which its curve is said not to explain the rows
-
 
 def strength(
     campaign: Annotated[Path, typer.Argument(help="Campaign folder with strength/NAME/strength.toml.")],
@@ -28,6 +26,7 @@ def strength(
     as_json: options.AsJson = False,
 ) -> None:
     """Fit the curves of static compression, tension and shear tests, and compare them with the drops' p_m."""
+    from ..inference.fitting import REJECTED
     from ..inference.observations.drop_terms import Terms
     from ..inference.observations.static_tests import PARAMETERS, fit_softness, fit_strength
     from ..report.strength_figures import draw_strength
@@ -60,7 +59,7 @@ def strength(
         }
         said = ", ".join(_say(name, value, sigma[name], units[name]) for name, value in fit.values.items())
         lines.append(f"{fit.kind.replace('_', ' ')} ({', '.join(fit.tests)}, {fit.points} rows): {said}")
-        if fit.p_value < DOUBTFUL:
+        if fit.p_value < REJECTED:
             warnings.append(
                 f"{fit.kind}: the curve does not explain its rows (p = {fit.p_value:.2g}); relative_sigma is too small, or the "
                 "dust has another law"

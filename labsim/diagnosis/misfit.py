@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..inference.fitting import DOUBTFUL, Fit
+from ..inference.blocks import Block
+from ..inference.fitting import DOUBTFUL, Fit, rate_block
 from ..inference.observations.compacted_zone import CompactedZone
 from ..inference.observations.tracks import DropsBlock
 from ..inference.workbench import Workbench
@@ -50,26 +51,19 @@ def measure_misfit(bench: Workbench, fit: Fit) -> tuple[list[Part], list[Part]]:
     """Every observation, and every drop by itself."""
     parts, drops = [], []
     for observation, block in zip(bench.observations, fit.blocks, strict=True):
-        free = 0
         regions: tuple[Region, ...] = ()
         if isinstance(block, DropsBlock):
-            free = 1 + len(fit.hypothesis) + 2 * len(block.sections)
             for name, section in block.sections.items():
-                own = np.linalg.solve(
-                    np.linalg.cholesky(block.covariance[section, section]), block.residual[section]
-                )
-                drops.append(_rate(name, "drop", float(own @ own), own.size, 2))
+                own = Block(block.residual[section], block.covariance[section, section], {})
+                p_value = float(
+                    chi2.sf(own.chi_square, max(own.residual.size - 2, 1))
+                )  # contact time and speed
+                drops.append(Part(name, "drop", own.chi_square, own.residual.size, p_value))
         elif isinstance(observation, CompactedZone):
             regions = compare_regions(observation, block.residual, block.covariance)
-        part = _rate(observation.name, observation.kind, block.chi_square, block.residual.size, free, regions)
-        parts.append(part)
+        p_value, points = rate_block(block, fit.hypothesis), block.residual.size
+        parts.append(Part(observation.name, observation.kind, block.chi_square, points, p_value, regions))
     return parts, drops
-
-
-def _rate(
-    name: str, kind: str, chi_square: float, points: int, free: int, regions: tuple[Region, ...] = ()
-) -> Part:
-    return Part(name, kind, chi_square, points, float(chi2.sf(chi_square, max(points - free, 1))), regions)
 
 
 def compare_regions(zone: CompactedZone, residual: FloatArray, covariance: FloatArray) -> tuple[Region, ...]:

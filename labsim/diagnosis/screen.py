@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..inference.blocks import whiten_all
 from ..inference.evidence import integrate_linear, log_share_inside
 from ..inference.fitting import Fit, with_probes
 from ..inference.nodes import amplitude_nodes, screening_node
@@ -70,15 +71,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     ]
     bench.require_changes(wanted, "fingerprints", coarse=True)
     names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
-    blocks = with_probes(bench, fit, names)
-    whitened = np.concatenate(
-        [
-            block.whiten(
-                np.stack([block.residual, *(block.tangents[name] for name in ("ln_p_m", *names))], axis=1)
-            )
-            for block in blocks
-        ]
-    )
+    whitened = whiten_all(with_probes(bench, fit, names), ["ln_p_m", *names])
     sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))
     direction = whitened[:, 1] * sigma
     along = direction @ whitened

@@ -17,7 +17,6 @@ from scipy.optimize import minimize_scalar
 from ..effects import Effect, Parameter
 from ..inference.blocks import solve_globals
 from ..inference.fitting import Fit
-from ..inference.observations.undisturbed import Layering
 from ..inference.tangents import linearise_alone
 from ..inference.workbench import Workbench
 from .screen import Screening
@@ -59,20 +58,16 @@ def cause(name: str) -> str:
 
 
 def _shows_in_dust(bench: Workbench, name: str) -> bool:
-    dust = _find_dust(bench)
+    dust = bench.layering
     if dust is None:
         return False
     block = linearise_alone(bench, dust, {}, {name: bench.effects[name].amplitudes[0].step})
     return bool(np.any(block.tangents[name] != 0.0))
 
 
-def _find_dust(bench: Workbench) -> Layering | None:
-    return next((each for each in bench.observations if isinstance(each, Layering)), None)
-
-
 def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
     """Best shape by the undisturbed dust alone, with its amplitude free; its prior's price goes to shape_evidence."""
-    effect, dust = bench.effects[name], _find_dust(bench)
+    effect, dust = bench.effects[name], bench.layering
     assert dust is not None
     width = effect.amplitudes[0].scale
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..inference.blocks import whiten_all
 from ..inference.fitting import Fit, with_probes
 from ..inference.workbench import Workbench
 from .screen import has_runs
@@ -56,14 +57,8 @@ def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
         if effect.amplitudes and name not in fit.hypothesis and effect.kind != "numerics"
     ]
     names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
-    blocks = with_probes(bench, fit, names)
     known = ["ln_p_m", *fit.hypothesis]
-    tangents = np.concatenate(
-        [
-            block.whiten(np.stack([block.tangents[name] for name in [*known, *names]], axis=1))
-            for block in blocks
-        ]
-    )
+    tangents = whiten_all(with_probes(bench, fit, names), [*known, *names])[:, 1:]
     scales = np.array([bench.effects[name].amplitudes[0].scale for name in fit.hypothesis])
     priors = np.hstack(
         [np.zeros((len(scales), 1)), np.diag(1.0 / scales), np.zeros((len(scales), len(names)))]

@@ -67,6 +67,16 @@ def factorise(covariance: FloatArray) -> FloatArray:
     raise ExtrapolationError("simulation", "runs", "extrapolate to no finite depth here; see labsim runs")
 
 
+def whiten_all(blocks: Sequence[Block], names: Sequence[str]) -> FloatArray:
+    """Residual and tangents of all blocks in directions of independent errors of unit size, (n, 1 + names)."""
+    return np.concatenate(
+        [
+            block.whiten(np.stack([block.residual, *(block.tangents[name] for name in names)], axis=1))
+            for block in blocks
+        ]
+    )
+
+
 def solve_globals(
     blocks: Sequence[Block], names: Sequence[str], priors: Mapping[str, tuple[float, float]]
 ) -> tuple[FloatArray, FloatArray, float, float, list[FloatArray]]:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..records import FloatArray
+from .blocks import Block
 from .evidence import integrate_by_laplace
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
 from .observations.tracks import DropsBlock
@@ -132,11 +133,14 @@ def goodness_of_fit(fit: Fit) -> float:
 
     Contact time and speed of each drop are free; parts that are known better than they scatter do not hide one that fails.
     """
-    worst = []
-    for block in fit.blocks:
-        free = 1 + len(fit.hypothesis) + 2 * len(block.sections) if isinstance(block, DropsBlock) else 0
-        worst.append(float(chi2.sf(block.chi_square, max(block.residual.size - free, 1))))
+    worst = [rate_block(block, fit.hypothesis) for block in fit.blocks]
     return min(1.0, len(worst) * min(worst))
+
+
+def rate_block(block: Block, hypothesis: Hypothesis) -> float:
+    """p value of one observation's χ²; drops pay for the globals and for contact time and speed of each."""
+    free = 1 + len(hypothesis) + 2 * len(block.sections) if isinstance(block, DropsBlock) else 0
+    return float(chi2.sf(block.chi_square, max(block.residual.size - free, 1)))
 
 
 def with_probes(bench: Workbench, fit: Fit, names: Sequence[str], log_p_m: float | None = None) -> Blocks:

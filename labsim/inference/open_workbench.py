@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from .runs import Progress, RunStore
 from .supported import refuse_others
 from .workbench import Workbench
 
+Seen = TypeVar("Seen")
 SCAN_MARGIN = 1.06
 SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
 
@@ -52,18 +54,15 @@ def open_workbench(
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
     observations: list[Observation] = []
-    members: dict[Projectile, list[ObservedDrop]] = {}
-    for drop in drops:
-        members.setdefault(drop.drop.projectile.simulated, []).append(drop)
     models, features = [], []
-    for projectile, group in members.items():
+    for projectile, group in group_alike((drop.drop.projectile, drop) for drop in drops).items():
         nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
         table = ResponseTable(np.log(nodes), few)
         features.append(RunFeatures(len(families), table, encode_run))
         families.append(Family(projectile, nodes, False, few))
         models += [make_drop_model(drop, table) for drop in group]
     observations.append(Tracks(tuple(models), tuple(features)))
-    for projectile, scanned in _group_scans(scans).items():
+    for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
         nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
         for scan in scanned:
             encode = partial(encode_scan_run, observed=scan)
@@ -123,8 +122,9 @@ def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float
     return nodes, few_positions(nodes, slowest, fastest)
 
 
-def _group_scans(scans: Sequence[ObservedScan]) -> dict[Projectile, list[ObservedScan]]:
-    groups: dict[Projectile, list[ObservedScan]] = {}
-    for scan in scans:
-        groups.setdefault(scan.scan.projectile.simulated, []).append(scan)
+def group_alike(measured: Iterable[tuple[Projectile, Seen]]) -> dict[Projectile, list[Seen]]:
+    """What was seen of projectiles that a simulation cannot tell apart, by all of them that it takes."""
+    groups: dict[Projectile, list[Seen]] = {}
+    for projectile, seen in measured:
+        groups.setdefault(projectile.simulated, []).append(seen)
     return groups

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
-from ..errors import InferenceError
-from ..records import Campaign, FloatArray, Projectile
+from ..records import Campaign, FloatArray
 from ..sph import DropSetting
 from .forward import ResponseTable
 from .grid import (
@@ -67,9 +66,14 @@ class Workbench:
         return [each for each in self.observations if isinstance(each, CompactedZone)]
 
     @property
-    def undisturbed(self) -> list[UndisturbedDust]:
+    def layering(self) -> Layering | None:
+        """The undisturbed dust of all scans."""
+        return next((each for each in self.observations if isinstance(each, Layering)), None)
+
+    @property
+    def undisturbed(self) -> tuple[UndisturbedDust, ...]:
         """Scans whose undisturbed dust is compared."""
-        return [dust for each in self.observations if isinstance(each, Layering) for dust in each.dust]
+        return self.layering.dust if self.layering else ()
 
     @property
     def features(self) -> list[RunFeatures]:
@@ -224,11 +228,3 @@ class Workbench:
 
     def costs_runs(self, name: str) -> bool:
         return self.effects[name].costs_runs and not self.strength_only(name)
-
-
-def find_family(families: Sequence[Family], projectile: Projectile, *, is_scan: bool) -> int:
-    """Number of the family with this projectile."""
-    for number, family in enumerate(families):
-        if (family.projectile, family.is_scan) == (projectile.simulated, is_scan):
-            return number
-    raise InferenceError("simulation", "projectile", "has no runs")

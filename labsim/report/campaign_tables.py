@@ -20,7 +20,7 @@ from ..inference.workbench import Workbench
 from ..records import FloatArray
 from ..sph import solver_hash
 from .law_words import comes_nearest, describe_unknown, say_missing
-from .phrases import CERTAIN, say_amount, say_hypothesis, say_probability
+from .phrases import CERTAIN, say_amount, say_combination, say_hypothesis, say_probability
 
 NUMERICAL_DEPTH = (
     0.0033  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
@@ -283,10 +283,9 @@ def _say_untestable(found: Diagnosis) -> list[str]:
         for each in moving[:MOST_SAID]
     ]
     more = f", and {len(moving) - MOST_SAID} more" if len(moving) > MOST_SAID else ""
-    value = found.combination.value / 1e3
     return [
         f"  not testable here: {', '.join(named)}{more}",
-        f"  what holds all the same: {found.combination.expression} = {value:.3g} ± {value * sigma:.2g} kPa",
+        f"  what holds all the same: {say_combination(found.combination)}",
     ]
 
 

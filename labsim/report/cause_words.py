@@ -11,7 +11,7 @@ from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.misfit import say_misfit
 from .law_words import say_missing
 from .page import show_number
-from .phrases import SHOWN
+from .phrases import SHOWN, say_combination
 
 BADGES = {
     "none": "Nothing is wrong beyond the errors",
@@ -94,8 +94,7 @@ def describe_untestable(found: Diagnosis) -> dict[str, Any] | None:
         "deviations of the data, and p_m takes its place. The last column is the p_m of dust with so much of it, on either side."
     )
     if found.combination is not None:
-        value, sigma = found.combination.value / 1e3, found.combination.value * found.combination.sigma / 1e3
-        words += f" Measured all the same: {found.combination.expression} = {value:.3g} ± {sigma:.2g} kPa."
+        words += f" Measured all the same: {say_combination(found.combination)}."
     rows = [
         (
             each.name,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ..diagnosis.untestable import Combination
 from ..effects import Parameter
 
 SHOWN = {"Pa": (1e-3, "kPa"), "m": (1e3, "mm"), "1/m": (1e-3, "1/mm"), "1": (1.0, "")}  # to what people see
@@ -32,6 +33,12 @@ def say_hypothesis(hypothesis: Sequence[str]) -> str:
 
 def add_article(label: str) -> str:
     return "the nominal model" if label == "nominal" else label
+
+
+def say_combination(found: Combination) -> str:
+    """p_m * shear_strength.factor^0.35 = 1.3 ± 0.06 kPa."""
+    value = found.value / 1e3
+    return f"{found.expression} = {value:.3g} ± {value * found.sigma:.2g} kPa"
 
 
 def say_probability(value: float) -> str:

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-import pytest
+import laws
 
-from labsim.errors import InferenceError
-from labsim.inference.grid import Family
-from labsim.inference.workbench import find_family
+from labsim.campaign import read_campaign
+from labsim.inference.calibrate import prepare
+from labsim.inference.open_workbench import group_alike
 from labsim.records import Projectile
 
 
@@ -20,17 +20,21 @@ class Cone(Projectile):
 def test_a_new_field_of_a_projectile_tells_families_apart():
     blunt = Cone("hemisphere", 5e-4, 1e-6, mass_sigma=1e-9, length=4e-3, half_angle=0.9)
     sharp = replace(blunt, half_angle=0.3)
-    families = [Family(each.simulated, (0.1, 0.2, 0.3), False, (0, 1, 2)) for each in (blunt, sharp)]
-    assert [find_family(families, each, is_scan=False) for each in (blunt, sharp)] == [0, 1]
-    assert families[1].projectile.half_angle == 0.3
-    with pytest.raises(InferenceError, match="has no runs"):
-        find_family(families, sharp, is_scan=True)
-    with pytest.raises(InferenceError, match="has no runs"):
-        find_family(families, replace(sharp, half_angle=0.31), is_scan=False)
+    groups = group_alike([(blunt, "blunt"), (sharp, "sharp")])
+    assert list(groups.values()) == [["blunt"], ["sharp"]]
+    assert list(groups)[1].half_angle == 0.3
+    assert replace(sharp, half_angle=0.31).simulated not in groups
 
 
 def test_what_no_simulation_depends_on_does_not():
     rod = Projectile("hemisphere", 5e-4, 1e-6, mass_sigma=1e-9, length=4e-3)
-    families = [Family(rod.simulated, (0.1, 0.2, 0.3), False, (0, 1, 2))]
     assert rod.simulated == Projectile("hemisphere", 5e-4, 1e-6)
-    assert find_family(families, replace(rod, mass_sigma=0.0, length=1e-2), is_scan=False) == 0
+    assert list(group_alike([(rod, 1), (replace(rod, mass_sigma=0.0, length=1e-2), 2)]).values()) == [[1, 2]]
+
+
+def test_drops_and_scans_of_one_size_have_runs_of_their_own(tmp_path):
+    campaign = read_campaign(laws.write_campaign(tmp_path / "made", scan=True))
+    bench, _ = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1)
+    drops, scans = ([each.family for each in seen.features] for seen in (bench.tracks, bench.scans[0]))
+    assert drops == [0, 1, 2] and scans == [3]
+    assert [family.is_scan for family in bench.families] == [False, False, False, True]

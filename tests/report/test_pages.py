@@ -126,7 +126,7 @@ def test_every_section_in_order_with_its_numbers(name: str, request: pytest.Fixt
         assert each["cause"] in text and f"{low:.3g} to {high:.3g}" in text
     missed = [part["name"] for part in diagnosis["misfit"] if part["p_value"] < 0.05]
     assert ("The nominal fit misses" in text) == bool(missed) and all(name in text for name in missed)
-    assert [part["name"] for part in diagnosis["misfit"]][0] == "drops"
+    assert diagnosis["misfit"][0]["name"] == "drops"
     figures = json.loads(page.scripts[0])
     drawn = [a["data-figure"] for a in page.all("div") if "data-figure" in a]
     assert sorted(drawn) == sorted(figures), "every figure has its place and every place its figure"

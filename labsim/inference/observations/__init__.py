@@ -12,11 +12,14 @@ campaign's folder holds of it and returns an Observation, or None where there is
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
+
+import numpy as np
 
 from ...errors import InferenceError, LabsimError
 from ...extensions import list_modules
@@ -71,6 +74,41 @@ class Observation(Protocol):
 
         weighted : (n,) inverse covariance times what is left of the residual.
         """
+
+
+class Direct(ABC):
+    """An Observation whose data follow from the setting alone: no runs, no nuisances. A kind has ``kind`` and ``name``, and says
+    what it expects and how its data compare with that."""
+
+    features: Sequence[RunFeatures] = ()
+
+    @abstractmethod
+    def expect(self, log_p_m: float, point: Probe) -> FloatArray:
+        """What a true model gives at a point, (n,)."""
+
+    @abstractmethod
+    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
+        """The data with their errors about what is expected."""
+
+    def begin(self) -> FloatArray:
+        return np.empty(0)
+
+    def linearise(
+        self,
+        nuisances: FloatArray,
+        log_p_m: float,
+        nominal: Probe,
+        terms: Terms,
+        probes: Mapping[str, Probe],
+    ) -> Block:
+        here = self.expect(log_p_m, nominal)
+        tangents = {"ln_p_m": (self.expect(log_p_m + 1e-3, nominal) - here) / 1e-3}
+        for name, point in probes.items():
+            tangents[name] = (self.expect(log_p_m, point) - here) / point.step
+        return self.compare(here, tangents, terms)
+
+    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
+        return nuisances, 0.0
 
 
 def list_own_files(folder: Path) -> list[Path]:

@@ -162,7 +162,57 @@ class CompactedZone:
         terms: Terms,
         probes: Mapping[str, Probe],
     ) -> Block:
-        return linearise_zone(self, float(nuisances[0]), log_p_m, nominal, terms, probes)
+        observed, log_speed = self.observed, float(nuisances[0])
+        found = observed.reduced.map
+        amplitudes, instrument = nominal.amplitudes, nominal.instruments[observed.name]
+        response = self.table.at(log_p_m, log_speed)
+
+        def see(code: FloatArray, inst: Instrument) -> FloatArray:
+            return np.concatenate([code[1:] * inst.ct_scale, [math.exp(code[0])]])
+
+        def predict(lp: float, ls: float) -> FloatArray:
+            return see(self.table.code(lp, ls, amplitudes), instrument)
+
+        here = see(response.code(amplitudes), instrument)
+        changed = np.zeros(here.size - 1)  # of the compaction, not of the dust that it began with
+        if amplitudes:
+            plain = see(response.code({}), instrument)[:-1] - observed.undisturbed
+            changed = here[:-1] - observed.beside - plain
+        data = np.concatenate([observed.filling_factor, [found.tip_depth]])
+        n = data.size - 1
+        covariance = np.zeros((n + 1, n + 1))
+        covariance[:n, :n] = observed.noise
+        contrast = np.abs(here[:n] - observed.beside)
+        for (share, _length), alike in zip(NUMERICAL, observed.likeness, strict=True):
+            error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
+            covariance[:n, :n] += np.outer(error, error) * alike
+        covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
+        speed = observed.scan.speed
+        spread = speed.sigma / speed.value
+        reach = REACH * contrast * (1.0 - np.minimum(contrast / max(float(np.max(contrast)), 1e-12), 1.0))
+        by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
+        local = [
+            (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * spread,
+            by_strength * math.hypot(terms.scatter, STRENGTH),
+            np.append(here[:n] * GREY, 0.0),
+            np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
+            np.append(reach, 0.0),
+            np.append(changed * terms.zone_change, 0.0),
+            np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
+        ]
+        pull = (log_speed - float(self.begin()[0])) / spread
+        columns = np.stack(local, axis=1)
+        covariance += columns @ columns.T
+        covariance[np.diag_indices(n + 1)] += 1e-12
+        tangents = {"ln_p_m": by_strength}
+        for name, point in probes.items():
+            moved = see(response.code(point.amplitudes), point.instruments[observed.name])
+            tangents[name] = (moved - here) / point.step
+        residual = data - here + local[0] * pull  # the speed is zero-mean about what is stated
+        # what an unknown cause changes is alike in all cells of like contrast
+        size = np.append(contrast, 0.0)
+        like = np.exp(-0.5 * (np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))) ** 2)
+        return Block(residual, covariance, tangents, np.outer(size, size) * like, columns[:, :1])
 
     def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
         """The move in two stated uncertainties of the speed."""
@@ -171,68 +221,6 @@ class CompactedZone:
         best = np.clip(block.nuisances.T @ weighted, -3.0, 3.0)
         moved = self.begin() + best * spread
         return moved, 0.5 * float(np.abs(moved - nuisances).max()) / spread
-
-
-def linearise_zone(
-    model: CompactedZone,
-    log_speed: float,
-    log_p_m: float,
-    nominal: Probe,
-    terms: Terms,
-    probes: Mapping[str, Probe],
-) -> Block:
-    """Residual, covariance and tangents of one scan about the point ``nominal``."""
-    observed = model.observed
-    found = observed.reduced.map
-    amplitudes, instrument = nominal.amplitudes, nominal.instruments[observed.name]
-    response = model.table.at(log_p_m, log_speed)
-
-    def see(code: FloatArray, inst: Instrument) -> FloatArray:
-        return np.concatenate([code[1:] * inst.ct_scale, [math.exp(code[0])]])
-
-    def predict(lp: float, ls: float) -> FloatArray:
-        return see(model.table.code(lp, ls, amplitudes), instrument)
-
-    here = see(response.code(amplitudes), instrument)
-    changed = np.zeros(here.size - 1)  # of the compaction, not of the dust that it began with
-    if amplitudes:
-        plain = see(response.code({}), instrument)[:-1] - observed.undisturbed
-        changed = here[:-1] - observed.beside - plain
-    data = np.concatenate([observed.filling_factor, [found.tip_depth]])
-    n = data.size - 1
-    covariance = np.zeros((n + 1, n + 1))
-    covariance[:n, :n] = observed.noise
-    contrast = np.abs(here[:n] - observed.beside)
-    for (share, _length), alike in zip(NUMERICAL, observed.likeness, strict=True):
-        error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
-        covariance[:n, :n] += np.outer(error, error) * alike
-    covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
-    speed = observed.scan.speed
-    spread = speed.sigma / speed.value
-    reach = REACH * contrast * (1.0 - np.minimum(contrast / max(float(np.max(contrast)), 1e-12), 1.0))
-    by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
-    nuisances = [
-        (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * spread,
-        by_strength * math.hypot(terms.scatter, STRENGTH),
-        np.append(here[:n] * GREY, 0.0),
-        np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
-        np.append(reach, 0.0),
-        np.append(changed * terms.zone_change, 0.0),
-        np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
-    ]
-    pull = (log_speed - float(model.begin()[0])) / spread
-    columns = np.stack(nuisances, axis=1)
-    covariance += columns @ columns.T
-    covariance[np.diag_indices(n + 1)] += 1e-12
-    tangents = {"ln_p_m": by_strength}
-    for name, point in probes.items():
-        moved = see(response.code(point.amplitudes), point.instruments[observed.name])
-        tangents[name] = (moved - here) / point.step
-    residual = data - here + nuisances[0] * pull  # the speed is zero-mean about what is stated
-    # what an unknown cause changes is alike in all cells of like contrast
-    size = np.append(contrast, 0.0)
-    like = np.exp(-0.5 * (np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))) ** 2)
-    return Block(residual, covariance, tangents, np.outer(size, size) * like, columns[:, :1])
 
 
 def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:

@@ -18,9 +18,9 @@ from scipy.stats import chi2
 
 from ...errors import InferenceError
 from ...records import Campaign, FloatArray, Material, StrengthTest
-from ...sph.materials.porous_dust import TABLE_SIZE, TABLE_TOP, tabulate_strengths
+from ...sph.materials.porous_dust import compressive_strength, tensile_strength
 from ..blocks import Block
-from . import RunFeatures
+from . import Direct
 from .drop_terms import Probe, Terms
 
 PARAMETERS = {  # of each kind's own curve, with units
@@ -126,8 +126,7 @@ def fit_softness(
 ) -> tuple[float, float, float]:
     """p_m (Pa) of compression tests with φ1, φ2 and Δ as stated, the standard deviation of its logarithm, p value of the fit."""
     phi, stress, lower = _stack(tests, [1.0] * len(tests), scatter)
-    curve, _ = tabulate_strengths(material.replace(p_m=1.0))
-    missed = np.log(stress) - np.interp(phi, np.linspace(0.0, TABLE_TOP, TABLE_SIZE), np.log(curve))
+    missed = np.log(stress / compressive_strength(phi, material.replace(p_m=1.0)))
     white = np.linalg.solve(lower, np.stack([missed, np.ones_like(missed)], axis=1))
     information = float(white[:, 1] @ white[:, 1])
     best = float(white[:, 0] @ white[:, 1]) / information
@@ -150,52 +149,39 @@ def _stack(
 
 
 @dataclass(frozen=True)
-class StaticTests:
-    """The tests that the law of the drops speaks of, an Observation without runs and nuisances."""
+class StaticTests(Direct):
+    """The tests that the law of the drops speaks of."""
 
     tests: tuple[StrengthTest, ...]
     kind: str = "static tests"
     name: str = "static tests"
-    features: tuple[RunFeatures, ...] = ()
 
-    def begin(self) -> FloatArray:
-        return np.empty(0)
-
-    def linearise(
-        self,
-        nuisances: FloatArray,
-        log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
-    ) -> Block:
-        # strength of tension does not follow p_m, of shear half; all samples scatter alike
-        shares = [0.5 if test.kind == "shear" else 1.0 for test in self.tests]
-        _, stress, lower = _stack(self.tests, shares, terms.scatter)
-        here = self._expect(log_p_m, nominal)
-        tangents = {"ln_p_m": (self._expect(log_p_m + 1e-3, nominal) - here) / 1e-3}
-        for name, point in probes.items():
-            tangents[name] = (self._expect(log_p_m, point) - here) / point.step
-        return Block(np.log(stress) - here, lower @ lower.T, tangents)
-
-    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
-        return nuisances, 0.0
-
-    def _expect(self, log_p_m: float, point: Probe) -> FloatArray:
-        """ln of the stresses in Pa by the law at a point, (n,)."""
+    def expect(self, log_p_m: float, point: Probe) -> FloatArray:
+        """ln of the stresses in Pa by the law."""
         setting = point.setting("static test")
         factor = next(iter(point.instruments.values())).static_factor
         material = setting.material.replace(p_m=math.exp(log_p_m) * factor)
-        compressive, tensile = (np.log(each) for each in tabulate_strengths(material, setting.strength_shape))
-        grid = np.linspace(0.0, TABLE_TOP, TABLE_SIZE)
-        curves = {
-            "compression_omnidirectional": compressive,
-            "tension": tensile,
-            "shear": math.log(max(material.shear_factor, 1e-12)) + 0.5 * (compressive + tensile),
-        }
-        return np.concatenate(
-            [np.interp([phi for phi, _ in test.points], grid, curves[test.kind]) for test in self.tests]
-        )
+        shear_factor = math.log(max(material.shear_factor, 1e-12))
+        expected = []
+        for test in self.tests:
+            phi = np.array([phi for phi, _ in test.points])
+            compressive = np.log(compressive_strength(phi, material))
+            if setting.strength_shape:
+                compressive = compressive + np.log(np.interp(phi, *np.transpose(setting.strength_shape)))
+            tensile = np.log(-tensile_strength(phi, material))
+            curves = {
+                "compression_omnidirectional": compressive,
+                "tension": tensile,
+                "shear": shear_factor + 0.5 * (compressive + tensile),
+            }
+            expected.append(curves[test.kind])
+        return np.concatenate(expected)
+
+    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
+        # strength of tension does not follow p_m, of shear half; all samples scatter alike
+        shares = [0.5 if test.kind == "shear" else 1.0 for test in self.tests]
+        _, stress, lower = _stack(self.tests, shares, terms.scatter)
+        return Block(np.log(stress) - expected, lower @ lower.T, tangents)
 
 
 def observe(campaign: Campaign) -> StaticTests | None:

@@ -10,7 +10,7 @@ calibration (GREY), both common to all scans; for the point spread POINT_SPREAD_
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from ...ct.reduce import ReducedScan
 from ...records import FloatArray, Scan
 from ...sph.particles import initial_filling_factor
 from ..blocks import Block
-from . import RunFeatures
+from . import Direct
 from .drop_terms import Probe, Terms
 
 REACH = 3.0  # tip radii about the bead and its path within which dust may have moved
@@ -69,64 +69,36 @@ def observe_undisturbed(reduced: ReducedScan) -> UndisturbedDust | None:
 
 
 @dataclass(frozen=True)
-class Layering:
-    """The undisturbed dust of all scans, an Observation without runs and nuisances. sigma : stated, of the sample's φ0."""
+class Layering(Direct):
+    """The undisturbed dust of all scans; of a point's settings the initial state counts. sigma : stated, of the sample's φ0."""
 
     dust: tuple[UndisturbedDust, ...]
     sigma: float
     kind: str = "undisturbed dust"
     name: str = "undisturbed dust"
-    features: tuple[RunFeatures, ...] = ()
 
-    def begin(self) -> FloatArray:
-        return np.empty(0)
+    def expect(self, log_p_m: float, point: Probe) -> FloatArray:
+        parts = []
+        for each in self.dust:
+            instrument = point.instruments[each.name]
+            filling_factor = initial_filling_factor(point.setting(each.name), each.depth)
+            spread = math.hypot(POINT_SPREAD_VOXELS * each.scan.voxel, instrument.ct_blur)
+            parts.append(np.append(instrument.stated_filling_factor(filling_factor), math.log(spread)))
+        return np.concatenate(parts)
 
-    def linearise(
-        self,
-        nuisances: FloatArray,
-        log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
-    ) -> Block:
-        return linearise_layering(self.dust, nominal, probes, self.sigma)
-
-    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
-        return nuisances, 0.0
-
-
-def linearise_layering(
-    dust: Sequence[UndisturbedDust],
-    nominal: Probe,
-    probes: Mapping[str, Probe],
-    filling_factor_sigma: float,
-) -> Block:
-    """All scans about the point ``nominal``; of its settings the initial state counts."""
-    data = np.concatenate([np.append(each.filling_factor, math.log(each.point_spread)) for each in dust])
-    here = _expect(dust, nominal)
-    row = np.concatenate([np.append(np.ones(each.depth.size), 0.0) for each in dust])
-    own = np.concatenate([np.full(each.depth.size + 1, k) for k, each in enumerate(dust)])
-    depth = np.concatenate([np.append(each.depth, 0.0) for each in dust])
-    sigma = np.concatenate([np.append(each.sigma, POINT_SPREAD_SIGMA[0]) for each in dust])
-    spread = 1.0 - row
-    same = np.equal.outer(own, own) * np.outer(row, row)
-    apart = np.subtract.outer(depth, depth)
-    covariance = np.diag(sigma**2) + SMOOTH**2 * same * np.exp(-0.5 * (apart / SMOOTH_LENGTH) ** 2)
-    level = row * math.hypot(filling_factor_sigma, GREY * float(np.mean(data[row > 0])))
-    covariance += np.outer(level, level) + POINT_SPREAD_SIGMA[1] ** 2 * np.outer(spread, spread)
-    tangents: dict[str, FloatArray] = {"ln_p_m": np.zeros(data.size)}
-    for name, point in probes.items():
-        tangents[name] = (_expect(dust, point) - here) / point.step
-    # an unnamed layering is the same in all samples, and grows with nothing but depth
-    free = np.outer(row * here, row * here) * np.exp(-0.5 * (apart / FREE_LENGTH) ** 2)
-    return Block(data - here, covariance, tangents, free)
-
-
-def _expect(dust: Sequence[UndisturbedDust], point: Probe) -> FloatArray:
-    parts = []
-    for each in dust:
-        instrument = point.instruments[each.name]
-        level = instrument.stated_filling_factor(initial_filling_factor(point.setting(each.name), each.depth))
-        spread = math.hypot(POINT_SPREAD_VOXELS * each.scan.voxel, instrument.ct_blur)
-        parts.append(np.append(level, math.log(spread)))
-    return np.concatenate(parts)
+    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
+        dust = self.dust
+        data = np.concatenate([np.append(each.filling_factor, math.log(each.point_spread)) for each in dust])
+        row = np.concatenate([np.append(np.ones(each.depth.size), 0.0) for each in dust])
+        own = np.concatenate([np.full(each.depth.size + 1, k) for k, each in enumerate(dust)])
+        depth = np.concatenate([np.append(each.depth, 0.0) for each in dust])
+        sigma = np.concatenate([np.append(each.sigma, POINT_SPREAD_SIGMA[0]) for each in dust])
+        spread = 1.0 - row
+        same = np.equal.outer(own, own) * np.outer(row, row)
+        apart = np.subtract.outer(depth, depth)
+        covariance = np.diag(sigma**2) + SMOOTH**2 * same * np.exp(-0.5 * (apart / SMOOTH_LENGTH) ** 2)
+        level = row * math.hypot(self.sigma, GREY * float(np.mean(data[row > 0])))
+        covariance += np.outer(level, level) + POINT_SPREAD_SIGMA[1] ** 2 * np.outer(spread, spread)
+        # an unnamed layering is the same in all samples, and grows with nothing but depth
+        free = np.outer(row * expected, row * expected) * np.exp(-0.5 * (apart / FREE_LENGTH) ** 2)
+        return Block(data - expected, covariance, tangents, free)
