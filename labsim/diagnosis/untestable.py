@@ -1,8 +1,8 @@
 """Causes that a campaign could not see were they there, and the p_m that each of them would imply.
 
-An effect of the size that its prior expects, one standard deviation, changes the data by ``trace`` standard deviations of their
-errors once ln p_m and what is fitted beside it have followed. What leaves less than SEEN passes for nothing, and p_m takes its
-place. All to first order about one fit.
+An effect changes the data by ``trace`` standard deviations of their errors once ln p_m and what is fitted beside it have
+followed. What leaves less than SEEN passes for nothing, and p_m takes its place: so each effect is taken with the amplitude that
+leaves that much, or with one standard deviation of its prior where that is less. All to first order about one fit.
 """
 
 from __future__ import annotations
@@ -18,20 +18,22 @@ from ..inference.workbench import Workbench
 from .screen import has_runs
 
 SEEN = 2.0  # standard deviations that a trace has to leave: the score of one effect exceeds that by chance one time in twenty
-CHANGES = 0.01  # of ln p_m: what moves it by less is not worth a line
+HALF = 1.645  # standard deviations, half of an interval of 90 %: what leaves p_m inside its own is not worth a line
 
 
 @dataclass(frozen=True)
 class Untestable:
-    """One cause, with an amplitude of one standard deviation of its prior.
+    """One cause, with the largest amplitude that passes for nothing.
 
     trace : what it leaves, in standard deviations of the data's errors; traded : ln p_m that a unit of amplitude takes from the
-    dust; p_m : lowest and highest, Pa, were it there on either side of null, as far as its limits go.
+    dust; values : of the cause's parameter, on either side of null as far as its limits go; p_m : lowest and highest, Pa, of dust
+    with so much of it.
     """
 
     name: str
     trace: float
     traded: float
+    values: tuple[float, float]
     p_m: tuple[float, float]
 
     @property
@@ -50,7 +52,7 @@ class Combination:
 
 
 def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
-    """Every effect beside those of the fit that leaves less than SEEN and moves p_m, that with the widest p_m first."""
+    """Every effect beside those of the fit that moves p_m, unseen, out of its 90 % interval; the widest p_m first."""
     names = [
         name
         for name, effect in bench.effects.items()
@@ -69,23 +71,25 @@ def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
     found = []
     for name, length, traded in zip(names, left, followed[0], strict=True):
         parameter = bench.effects[name].amplitudes[0]
-        ends = [parameter.hold(side * parameter.scale) - parameter.null for side in (-1.0, 0.0, 1.0)]
-        implied = np.clip(np.exp(fit.log_p_m - traded * np.array(ends)), *bench.campaign.p_m_range)
+        size = min(parameter.scale, SEEN / max(length, 1e-300))
+        values = [parameter.hold(side * size) for side in (-1.0, 0.0, 1.0)]
+        implied = np.exp(fit.log_p_m - traded * (np.array(values) - parameter.null))
+        implied = np.clip(implied, *bench.campaign.p_m_range)
         each = Untestable(
             name,
-            float(length * parameter.scale),
+            float(length * size),
             float(traded),
+            (values[0], values[2]),
             (float(implied.min()), float(implied.max())),
         )
-        if each.trace < SEEN and each.width > CHANGES:
+        if max(abs(math.log(p_m) - fit.log_p_m) for p_m in each.p_m) > HALF * math.sqrt(fit.covariance[0, 0]):
             found.append(each)
     return sorted(found, key=lambda each: -each.width)
 
 
 def find_combination(bench: Workbench, fit: Fit, untestable: list[Untestable]) -> Combination | None:
-    """p_m with what the first of the untestable causes takes; None where none moves p_m by more than its standard deviation."""
-    sigma = math.sqrt(fit.covariance[0, 0])
-    if not untestable or untestable[0].width < sigma:
+    """p_m with what the first of the untestable causes takes; None where everything is testable."""
+    if not untestable:
         return None
     name, power = untestable[0].name, untestable[0].traded
     parameter = bench.effects[name].amplitudes[0]
@@ -93,4 +97,4 @@ def find_combination(bench: Workbench, fit: Fit, untestable: list[Untestable]) -
     # about a null of one the amplitude is the ln of a factor
     amplitude = full if parameter.null == 0.0 else f"({full} - {parameter.null:g})"
     factor = f"{full}^{power:.2f}" if parameter.null == 1.0 else f"exp({power:.3g} * {amplitude})"
-    return Combination(f"p_m * {factor}", math.exp(fit.log_p_m), sigma)
+    return Combination(f"p_m * {factor}", math.exp(fit.log_p_m), math.sqrt(fit.covariance[0, 0]))

@@ -138,7 +138,13 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             for part in found.misfit[0]
         ],
         "not_testable": [
-            {"cause": each.name, "trace_sigma": each.trace, "p_m_Pa": list(each.p_m)}
+            {
+                "cause": each.name,
+                "trace_sigma": each.trace,
+                "value": list(each.values),
+                "unit": found.bench.effects[each.name].amplitudes[0].unit,
+                "p_m_Pa": list(each.p_m),
+            }
             for each in found.untestable
         ],
         "well_determined": found.combination
@@ -276,13 +282,12 @@ def _say_untestable(found: Diagnosis) -> list[str]:
     """Causes that could be there unseen, where they would move p_m by more than its error; and what holds all the same."""
     if found.combination is None:
         return []
-    sigma = found.combination.sigma
-    moving = [each for each in found.untestable if each.width > sigma]
     named = [
         f"{each.name} (p_m would be {each.p_m[0] / 1e3:.3g} to {each.p_m[1] / 1e3:.3g} kPa)"
-        for each in moving[:MOST_SAID]
+        for each in found.untestable[:MOST_SAID]
     ]
-    more = f", and {len(moving) - MOST_SAID} more" if len(moving) > MOST_SAID else ""
+    further = len(found.untestable) - MOST_SAID
+    more = f", and {further} more" if further > 0 else ""
     return [
         f"  not testable here: {', '.join(named)}{more}",
         f"  what holds all the same: {say_combination(found.combination)}",

@@ -90,8 +90,9 @@ def describe_untestable(found: Diagnosis) -> dict[str, Any] | None:
     if not found.untestable:
         return None
     words = (
-        "These causes may be there unseen: with one standard deviation of its prior each leaves less than two standard "
-        "deviations of the data, and p_m takes its place. The last column is the p_m of dust with so much of it, on either side."
+        "These causes may be there unseen, and p_m takes their place. The third column is the most that leaves no more than two "
+        "standard deviations of the data, or one standard deviation of its prior where that is less; the last is the p_m of dust "
+        "with so much of it."
     )
     if found.combination is not None:
         words += f" Measured all the same: {say_combination(found.combination)}."
@@ -99,7 +100,8 @@ def describe_untestable(found: Diagnosis) -> dict[str, Any] | None:
         (
             each.name,
             _title(found, [each.name]),
-            f"{each.trace:.1f}",
+            f"{each.values[0]:.3g} to {each.values[1]:.3g} "
+            + found.bench.effects[each.name].amplitudes[0].unit.removesuffix("1"),
             "{:.3g} to {:.3g}".format(*(p / 1e3 for p in each.p_m)),
         )
         for each in found.untestable
