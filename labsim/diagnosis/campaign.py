@@ -94,7 +94,7 @@ class Diagnosis(Judgement):
     confusable: list[tuple[str, str, float]]
     untestable: list[Untestable]
     combination: Combination | None
-    misfit: tuple[list[Part], list[Part]]
+    misfit: list[Part]
     held_out_nominal: HeldOut
     held_out_extended: HeldOut
     gain: Gain

@@ -17,7 +17,7 @@ import numpy as np
 from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
 from ..inference.fitting import Fit
-from ..inference.observations.compacted_zone import CompactedZone
+from ..inference.observations.compacted_zone import CompactedZones
 from ..inference.observations.tracks import Tracks
 from ..inference.workbench import Workbench
 from ..records import Campaign
@@ -69,10 +69,10 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
             fastest = max([fastest, *(math.exp(instant.log_speed) for instant in instants)])
             depths = (float(np.max(model.observed.depth)) / model.radius for model in observation.models)
             deepest = max([deepest, *depths])
-        elif isinstance(observation, CompactedZone):
-            observed = observation.observed
-            deepest = max(deepest, observed.reduced.map.tip_depth / observed.radius)
-            fastest = max(fastest, math.exp(float(nuisances[0])))
+        elif isinstance(observation, CompactedZones):
+            observed = [zone.observed for zone in observation.zones]
+            deepest = max([deepest, *(each.reduced.map.tip_depth / each.radius for each in observed)])
+            fastest = max(fastest, math.exp(float(nuisances.max())))
     material, level = bench.campaign.material, bench.campaign.sample.filling_factor
     dust = tuple(round(level + more, 6) for more in COMPACTION if level + more < material.phi_2)
     at_rest = (0.0, *SPEEDS)

@@ -7,6 +7,7 @@ taken as its own. Small p values are rare for a true model.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,7 @@ from scipy.stats import chi2
 
 from ..inference.blocks import Block
 from ..inference.fitting import DOUBTFUL, Fit, rate_block
-from ..inference.observations.compacted_zone import CompactedZone
-from ..inference.observations.tracks import DropsBlock
+from ..inference.observations.compacted_zone import CompactedZone, CompactedZones
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 
@@ -33,7 +33,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Part:
-    """One observation, or one drop of them all. regions : of a map, the clearest first."""
+    """One observation, or one record or map of several. sections : these; regions : of a map, the clearest first."""
 
     name: str
     kind: str
@@ -41,29 +41,40 @@ class Part:
     points: int
     p_value: float
     regions: tuple[Region, ...] = ()
+    sections: tuple[Part, ...] = ()
 
     @property
     def missed(self) -> bool:
         return self.p_value < DOUBTFUL
 
 
-def measure_misfit(bench: Workbench, fit: Fit) -> tuple[list[Part], list[Part]]:
-    """Every observation, and every drop by itself."""
-    parts, drops = [], []
+def measure_misfit(bench: Workbench, fit: Fit) -> list[Part]:
+    """Every observation, with every drop and map by itself."""
+    parts = []
     for observation, block in zip(bench.observations, fit.blocks, strict=True):
-        regions: tuple[Region, ...] = ()
-        if isinstance(block, DropsBlock):
-            for name, section in block.sections.items():
-                own = Block(block.residual[section], block.covariance[section, section], {})
-                p_value = float(
-                    chi2.sf(own.chi_square, max(own.residual.size - 2, 1))
-                )  # contact time and speed
-                drops.append(Part(name, "drop", own.chi_square, own.residual.size, p_value))
-        elif isinstance(observation, CompactedZone):
-            regions = compare_regions(observation, block.residual, block.covariance)
-        p_value, points = rate_block(block, fit.hypothesis), block.residual.size
-        parts.append(Part(observation.name, observation.kind, block.chi_square, points, p_value, regions))
-    return parts, drops
+        sections = []
+        for name, section in block.sections.items():
+            own = Block(block.residual[section], block.covariance[section, section], {})
+            regions: tuple[Region, ...] = ()
+            spent = 2  # contact time and speed of a drop
+            if isinstance(observation, CompactedZones):
+                zone = next(each for each in observation.zones if each.name == name)
+                regions, spent = compare_regions(zone, own.residual, own.covariance), 0
+            p_value = float(chi2.sf(own.chi_square, max(own.residual.size - spent, 1)))
+            kind = observation.kind.removesuffix("s")
+            sections.append(Part(name, kind, own.chi_square, own.residual.size, p_value, regions))
+        p_value = rate_block(block, fit.hypothesis)
+        parts.append(
+            Part(
+                observation.name,
+                observation.kind,
+                block.chi_square,
+                block.residual.size,
+                p_value,
+                sections=tuple(sections),
+            )
+        )
+    return parts
 
 
 def compare_regions(zone: CompactedZone, residual: FloatArray, covariance: FloatArray) -> tuple[Region, ...]:
@@ -89,7 +100,7 @@ def compare_regions(zone: CompactedZone, residual: FloatArray, covariance: Float
     return tuple(sorted(rated, key=lambda each: -abs(each.excess) / each.sigma))
 
 
-def say_misfit(parts: list[Part], drops: list[Part]) -> str:
+def say_misfit(parts: Sequence[Part]) -> str:
     """What is missed and what is met, in one sentence; empty where nothing is missed."""
     missed = [part for part in parts if part.missed]
     if not missed:
@@ -97,11 +108,16 @@ def say_misfit(parts: list[Part], drops: list[Part]) -> str:
     said = []
     for part in missed:
         text = f"{part.name} (χ² {part.chi_square:.0f} for {part.points} data"
-        if part.kind == "drops":
-            worst = [drop.name for drop in sorted(drops, key=lambda each: each.p_value) if drop.missed]
-            text += f", most {', '.join(worst[:3])}" if worst else ""
-        if part.regions and abs(part.regions[0].excess) > CLEAR * part.regions[0].sigma:
-            region = part.regions[0]
+        ranked = sorted(part.sections, key=lambda each: each.p_value)
+        worst = [each.name for each in ranked if each.missed]
+        if worst and len(ranked) > 1:
+            text += f", most {', '.join(worst[:3])}"
+        region = max(
+            (region for each in ranked for region in each.regions),
+            key=lambda each: abs(each.excess) / each.sigma,
+            default=None,
+        )
+        if region is not None and abs(region.excess) > CLEAR * region.sigma:
             more = "denser" if region.excess > 0 else "looser"
             text += f", {abs(region.excess):.3f} {more} than simulated {region.name}"
         said.append(text + ")")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ class Block:
 
     free : (n, n) covariance of what an unknown cause of unit size may do here, None where it may do nothing.
     nuisances : (n, k) what the observation's own nuisances change, per standard uncertainty of each; none where it has none.
+    sections : name of a record or map among several -> its part of the data.
     Arrays are never written to: the covariance is factorised once.
     """
 
@@ -28,6 +29,7 @@ class Block:
     tangents: Mapping[str, FloatArray]
     free: FloatArray | None = None
     nuisances: FloatArray | None = None
+    sections: Mapping[str, slice] = field(default_factory=dict)
 
     @cached_property
     def lower(self) -> FloatArray:

@@ -17,7 +17,7 @@ from .curves import encode_run
 from .forward import ResponseTable
 from .grid import Family, RunGrid, few_positions, speed_nodes
 from .observations import Observation, RunFeatures, observe_further
-from .observations.compacted_zone import CompactedZone, ObservedScan, encode_scan_run
+from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
 from .observations.drop_model import make_drop_model
 from .observations.drop_terms import Terms
 from .observations.tracks import Tracks
@@ -62,13 +62,16 @@ def open_workbench(
         families.append(Family(projectile, nodes, False, few))
         models += [make_drop_model(drop, table) for drop in group]
     observations.append(Tracks(tuple(models), tuple(features)))
+    zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
         nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
         for scan in scanned:
             encode = partial(encode_scan_run, observed=scan)
             own = RunFeatures(len(families), ResponseTable(np.log(nodes), few), encode)
-            observations.append(CompactedZone(scan, (own,)))
+            zones.append(CompactedZone(scan, own))
         families.append(Family(projectile, nodes, True, few))
+    if zones:
+        observations.append(CompactedZones(tuple(zones)))
     if undisturbed:
         observations.append(Layering(tuple(undisturbed), campaign.sample.filling_factor_sigma))
     observations += observe_further(campaign)

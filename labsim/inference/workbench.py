@@ -22,7 +22,7 @@ from .grid import (
 )
 from .nodes import amplitude_nodes, enclosing_nodes, screening_node
 from .observations import Observation, RunFeatures
-from .observations.compacted_zone import CompactedZone
+from .observations.compacted_zone import CompactedZone, CompactedZones
 from .observations.drop_terms import Terms
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
@@ -63,7 +63,7 @@ class Workbench:
     @property
     def scans(self) -> list[CompactedZone]:
         """The compacted zones that are compared."""
-        return [each for each in self.observations if isinstance(each, CompactedZone)]
+        return [zone for each in self.observations if isinstance(each, CompactedZones) for zone in each.zones]
 
     @property
     def layering(self) -> Layering | None:

@@ -132,11 +132,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "causes": causes,
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
-        "misfit": [
-            asdict(part)
-            | ({"drops": [asdict(drop) for drop in found.misfit[1]]} if part.kind == "drops" else {})
-            for part in found.misfit[0]
-        ],
+        "misfit": [asdict(part) for part in found.misfit],
         "not_testable": [
             {
                 "cause": each.name,
@@ -265,7 +261,7 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     lines.append(
         f"  nominal model: p = {found.p_value:.2g}; scatter between samples {found.scatter.mean:.3f} of ln p_m"
     )
-    if missed := say_misfit(*found.misfit):
+    if missed := say_misfit(found.misfit):
         lines.append(f"  the nominal model {missed}")
     for first, second, cosine in found.confusable[:4]:
         lines.append(f"  hard to tell apart here: {first} and {second} (cosine {cosine:+.2f})")

@@ -47,7 +47,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
         "Posterior probabilities of every cause alone, of pairs where one is not enough, of the nominal model (none) and of a "
         "free law without a name (unknown); together they are one."
     )
-    if missed := say_misfit(*found.misfit):
+    if missed := say_misfit(found.misfit):
         words += f" The nominal fit {missed}."
     if found.verdict.word == "unknown":
         words += f" {_say_unknown(found)}"

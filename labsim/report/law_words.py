@@ -29,7 +29,7 @@ def is_embedded(found: Diagnosis) -> bool:
 
 def say_missing(found: Diagnosis) -> str:
     """What the unnamed law of the best fit does, or depends on, and how large it is; after ``what is missing``."""
-    unknown, (parts, _) = found.unknown, found.misfit
+    unknown, parts = found.unknown, found.misfit
     missed = [part.name for part in parts if part.missed]
     if missed and not any(part.missed for part in parts if part.kind == "drops"):
         return f"shows in {' and '.join(missed)} alone: p_m explains the drops"

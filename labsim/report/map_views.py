@@ -11,7 +11,7 @@ import numpy as np
 from ..ct.reduce import reduce_scan
 from ..errors import MeasurementError
 from ..inference.fitting import Fit
-from ..inference.observations.compacted_zone import CompactedZone
+from ..inference.observations.compacted_zone import CompactedZones
 from ..inference.workbench import Workbench
 from ..records import Campaign, FillingMap, FloatArray
 
@@ -40,13 +40,12 @@ class MapView:
 def view_maps(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[MapView]:
     """Every scan of the likelihood; simulated dust is seen through the scan's own cells, blur and grey level."""
     views = []
-    for number, scan in enumerate(bench.observations):
-        if not isinstance(scan, CompactedZone):
-            continue
+    number = next((k for k, each in enumerate(bench.observations) if isinstance(each, CompactedZones)), 0)
+    for place, scan in enumerate(bench.scans):
         observed = scan.observed
         simulated = {}
         for name, fit in fits:
-            code = scan.table.code(fit.log_p_m, float(fit.nuisances[number][0]), fit.values)
+            code = scan.table.code(fit.log_p_m, float(fit.nuisances[number][place]), fit.values)
             scale = bench.instruments(fit.values)[observed.name].ct_scale
             full = np.full(observed.cells.shape, np.nan)
             full[observed.cells] = scale * code[1:]

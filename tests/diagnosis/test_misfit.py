@@ -15,17 +15,19 @@ def look(tmp_path, **changes):
 
 
 def test_nothing_is_missed_where_nothing_is_wrong(tmp_path):
-    parts, drops = look(tmp_path)
+    parts = look(tmp_path)
     assert [part.name for part in parts] == ["drops", "map C01", "undisturbed dust"]
+    drops, scanned, _ = (part.sections for part in parts)
     assert [drop.name for drop in drops] == [f"D{k:02d}" for k in range(1, 7)]
-    assert not any(part.missed for part in parts) and say_misfit(parts, drops) == ""
+    assert [one.name for one in scanned] == ["C01"]
+    assert not any(part.missed for part in parts) and say_misfit(parts) == ""
 
 
 def test_drops_that_move_otherwise_are_named(tmp_path):
-    parts, drops = look(tmp_path, bent=0.05)
-    said = say_misfit(parts, drops)
+    parts = look(tmp_path, bent=0.05)
+    said = say_misfit(parts)
     assert said.startswith("misses drops (χ²") and said.endswith("it meets map C01, undisturbed dust")
-    assert any(drop.missed for drop in drops)
+    assert any(drop.missed for drop in parts[0].sections)
 
 
 def test_a_map_whose_dust_is_otherwise_is_named_with_the_place(tmp_path, monkeypatch):
@@ -38,8 +40,8 @@ def test_a_map_whose_dust_is_otherwise_is_named_with_the_place(tmp_path, monkeyp
         return dust
 
     monkeypatch.setattr(laws, "make_dust", make)
-    parts, drops = look(tmp_path)
-    said = say_misfit(parts, drops)
+    parts = look(tmp_path)
+    said = say_misfit(parts)
     assert said.startswith("misses map C01 (χ²") and "denser than simulated under the tip" in said
     assert "it meets drops" in said
 
@@ -48,7 +50,6 @@ def test_drops_of_a_true_model_are_not_named(tmp_path):
     """The runs of this law have none of the solver's error that the likelihood allows, so p values lie above uniform ones."""
     found = []
     for k in range(4):
-        _, drops = look(tmp_path / str(k), seed=k)
-        found += [drop.p_value for drop in drops]
+        found += [drop.p_value for drop in look(tmp_path / str(k), seed=k)[0].sections]
     assert np.mean(found) > 0.4
     assert sum(p < 0.05 for p in found) <= 3  # of 24

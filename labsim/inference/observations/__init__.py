@@ -1,7 +1,7 @@
 """What a fit knows of the data, whatever instrument took them; and the kinds of measurement, one file each.
 
 Data that share no error with the rest are one Observation: all drops of a campaign (``tracks``: cameras and the solver err alike
-in them), each map of compacted dust (``compacted_zone``), the undisturbed dust of all scans (``undisturbed``), static tests
+in them), all maps of compacted dust (``compacted_zone``), the undisturbed dust of all scans (``undisturbed``), static tests
 (``static_tests``). Fits, screening and judging ask nothing else of them than what stands here.
 
 A further kind is one file here, or in a campaign's ``observations/``, found by listing: ``observe(campaign)`` reads what the

@@ -1,20 +1,21 @@
-"""The compacted zone of a CT map in the likelihood: simulated dust seen through the scan, in the frame of the tip.
+"""The compacted zones of CT maps in the likelihood: simulated dust seen through each scan, in the frame of the tip.
 
 Codes of scan runs are (ln D, filling factor on the scan's cells), the simulated dust moved so that its deepest tip lies where the
 scan's bead ends: the zone under the tip changes slowly with speed and p_m, the depth that it lies at does not. The bead rebounds
-by some tens of micrometres after the dust has stopped moving, so both are compared up to a common LIFT. Further nuisances:
-impact speed (stated, moved to its best value), grey level (GREY), sample scatter. Noise: the map's own, correlated between
-neighbouring cells as measured in undisturbed dust, and the solver's error of the compaction.
+by some tens of micrometres after the dust has stopped moving, so both are compared up to a LIFT. Each scan has noise of its own,
+correlated between neighbouring cells as measured in undisturbed dust, its speed and its sample's strength. The solver errs alike
+in drops that are alike, so its errors are common to scans as they are to drops, and the grey level is the scanner's.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ...ct.project import project
 from ...ct.reduce import ReducedScan
@@ -25,7 +26,7 @@ from ..blocks import Block
 from ..forward import ResponseTable
 from ..run_parts import Compaction
 from . import RunFeatures
-from .drop_terms import Probe, Terms
+from .drop_terms import Probe, Terms, measure_distances
 from .undisturbed import GREY, observe_undisturbed
 
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
@@ -71,12 +72,11 @@ class ObservedScan:
         return np.asarray(np.outer(self.sigma, self.sigma) * near_r**apart_r * near_z**apart_z)
 
     @cached_property
-    def likeness(self) -> list[FloatArray]:
-        """(n, n) correlations of each of the solver's errors in NUMERICAL."""
-        apart_r, apart_z = self._apart()
-        cell = float(np.mean(np.diff(self.reduced.map.r)))
-        distance2 = (apart_r**2 + apart_z**2) * (cell / self.radius) ** 2
-        return [np.exp(-0.5 * distance2 / length**2) for _share, length in NUMERICAL]
+    def about_tip(self) -> FloatArray:
+        """(n, 2) places of the cells from the lowest point of the bead, in tip radii."""
+        found = self.reduced.map
+        r, z = (grid[self.cells] for grid in np.meshgrid(found.r, found.z))
+        return np.stack([r, z + found.tip_depth], axis=1) / self.radius
 
     def _apart(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, n) distances between the cells, in cells."""
@@ -136,33 +136,48 @@ def encode_scan_run(run: DropRun | Compaction, observed: ObservedScan) -> FloatA
 
 
 @dataclass(frozen=True)
+class ZoneTerms:
+    """One scan about one point. residual : (n + 1,) of the cells and the tip's depth; own : (n + 1, n + 1) covariance of what no
+    other scan shares; tangents : name -> (n + 1,); speed : (n + 1,) per standard uncertainty of the stated speed; grey : (n + 1,)
+    what its error changes; solver : (n + 1, errors) those of the solver that go through the whole zone; contrast : (n,) |φ - φ0|;
+    reach : ln of the simulated depth over the tip radius."""
+
+    residual: FloatArray
+    own: FloatArray
+    tangents: Mapping[str, FloatArray]
+    speed: FloatArray
+    grey: FloatArray
+    solver: FloatArray
+    contrast: FloatArray
+    reach: float
+
+
+@dataclass(frozen=True)
 class CompactedZone:
-    """The zone of one scan that is compared, an Observation. Nuisances : (1,) ln of the impact speed."""
+    """The zone of one scan that is compared."""
 
     observed: ObservedScan
-    features: tuple[RunFeatures, ...]
-    kind: str = "map"
+    features: RunFeatures
 
     @property
     def name(self) -> str:
-        return f"map {self.observed.name}"
+        return self.observed.name
 
     @property
     def table(self) -> ResponseTable:
-        return self.features[0].table
+        return self.features.table
 
-    def begin(self) -> FloatArray:
-        return np.array([math.log(self.observed.scan.speed.value)])
+    @property
+    def spread(self) -> float:
+        """Standard uncertainty of ln of the stated speed."""
+        speed = self.observed.scan.speed
+        return speed.sigma / speed.value
 
     def linearise(
-        self,
-        nuisances: FloatArray,
-        log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
-    ) -> Block:
-        observed, log_speed = self.observed, float(nuisances[0])
+        self, log_speed: float, log_p_m: float, nominal: Probe, terms: Terms, probes: Mapping[str, Probe]
+    ) -> ZoneTerms:
+        """Residual, errors and tangents."""
+        observed = self.observed
         found = observed.reduced.map
         amplitudes, instrument = nominal.amplitudes, nominal.instruments[observed.name]
         response = self.table.at(log_p_m, log_speed)
@@ -180,47 +195,131 @@ class CompactedZone:
             changed = here[:-1] - observed.beside - plain
         data = np.concatenate([observed.filling_factor, [found.tip_depth]])
         n = data.size - 1
-        covariance = np.zeros((n + 1, n + 1))
-        covariance[:n, :n] = observed.noise
         contrast = np.abs(here[:n] - observed.beside)
-        for (share, _length), alike in zip(NUMERICAL, observed.likeness, strict=True):
-            error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
-            covariance[:n, :n] += np.outer(error, error) * alike
-        covariance[n, n] = (NUMERICAL_DEPTH * here[n]) ** 2
-        speed = observed.scan.speed
-        spread = speed.sigma / speed.value
         reach = REACH * contrast * (1.0 - np.minimum(contrast / max(float(np.max(contrast)), 1e-12), 1.0))
+        by_speed = (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * self.spread
         by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
         local = [
-            (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * spread,
-            by_strength * math.hypot(terms.scatter, STRENGTH),
-            np.append(here[:n] * GREY, 0.0),
+            by_speed,
+            by_strength * terms.scatter,
+            np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
+        ]
+        own = np.zeros((n + 1, n + 1))
+        own[:n, :n] = observed.noise
+        columns = np.stack(local, axis=1)
+        own += columns @ columns.T
+        own[np.diag_indices(n + 1)] += 1e-12
+        solver = [
+            by_strength * STRENGTH,
             np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
             np.append(reach, 0.0),
             np.append(changed * terms.zone_change, 0.0),
-            np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
+            np.append(np.zeros(n), NUMERICAL_DEPTH * here[n]),
         ]
-        pull = (log_speed - float(self.begin()[0])) / spread
-        columns = np.stack(local, axis=1)
-        covariance += columns @ columns.T
-        covariance[np.diag_indices(n + 1)] += 1e-12
         tangents = {"ln_p_m": by_strength}
         for name, point in probes.items():
             moved = see(response.code(point.amplitudes), point.instruments[observed.name])
             tangents[name] = (moved - here) / point.step
-        residual = data - here + local[0] * pull  # the speed is zero-mean about what is stated
-        # what an unknown cause changes is alike in all cells of like contrast
-        size = np.append(contrast, 0.0)
-        like = np.exp(-0.5 * (np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))) ** 2)
-        return Block(residual, covariance, tangents, np.outer(size, size) * like, columns[:, :1])
+        pull = (log_speed - math.log(observed.scan.speed.value)) / self.spread
+        return ZoneTerms(
+            data - here + by_speed * pull,  # the speed is zero-mean about what is stated
+            own,
+            tangents,
+            by_speed,
+            np.append(here[:n] * GREY, 0.0),
+            np.stack(solver, axis=1),
+            contrast,
+            math.log(float(here[n]) / observed.radius),
+        )
+
+
+@dataclass(frozen=True)
+class CompactedZones:
+    """The zones of all scans that are compared, an Observation. Nuisances : (scans,) ln of the impact speeds."""
+
+    zones: tuple[CompactedZone, ...]
+    kind: str = "map"
+
+    @property
+    def name(self) -> str:
+        return f"map {self.zones[0].name}" if len(self.zones) == 1 else "maps"
+
+    @property
+    def features(self) -> tuple[RunFeatures, ...]:
+        return tuple(zone.features for zone in self.zones)
+
+    @cached_property
+    def likeness(self) -> list[FloatArray]:
+        """(cells, cells) correlations of each of the solver's errors in NUMERICAL by the places of the cells."""
+        places = np.concatenate([zone.observed.about_tip for zone in self.zones])
+        apart = cdist(places, places, "sqeuclidean")
+        return [np.exp(-0.5 * apart / length**2) for _share, length in NUMERICAL]
+
+    def begin(self) -> FloatArray:
+        return np.array([math.log(zone.observed.scan.speed.value) for zone in self.zones])
+
+    def linearise(
+        self,
+        nuisances: FloatArray,
+        log_p_m: float,
+        nominal: Probe,
+        terms: Terms,
+        probes: Mapping[str, Probe],
+    ) -> Block:
+        parts = [
+            zone.linearise(float(log_speed), log_p_m, nominal, terms, probes)
+            for zone, log_speed in zip(self.zones, nuisances, strict=True)
+        ]
+        ends = np.cumsum([part.residual.size for part in parts])
+        sections = [
+            slice(int(end) - part.residual.size, int(end)) for part, end in zip(parts, ends, strict=True)
+        ]
+        own = np.concatenate([np.full(part.residual.size, k) for k, part in enumerate(parts)])
+        cells = np.ones(own.size, dtype=bool)
+        cells[ends - 1] = False
+        alike = self._find_alike(parts)[np.ix_(own, own)]
+        contrast = np.concatenate([part.contrast for part in parts])
+        covariance = np.zeros(alike.shape)
+        for (share, _length), places in zip(NUMERICAL, self.likeness, strict=True):
+            error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
+            covariance[np.ix_(cells, cells)] += np.outer(error, error) * places
+        solver = np.concatenate([part.solver for part in parts])
+        covariance = (covariance + solver @ solver.T) * alike
+        grey = np.concatenate([part.grey for part in parts])
+        covariance += np.outer(grey, grey)
+        # what an unknown cause changes is alike in all cells of like contrast of one scan
+        free = np.zeros(alike.shape)
+        speeds = np.zeros((own.size, len(parts)))
+        for k, (part, section) in enumerate(zip(parts, sections, strict=True)):
+            covariance[section, section] += part.own
+            size = np.append(part.contrast, 0.0)
+            apart = np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))
+            free[section, section] = np.outer(size, size) * np.exp(-0.5 * apart**2)
+            speeds[section, k] = part.speed
+        return Block(
+            np.concatenate([part.residual for part in parts]),
+            covariance,
+            {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
+            free,
+            speeds,
+            {zone.name: section for zone, section in zip(self.zones, sections, strict=True)},
+        )
+
+    def _find_alike(self, parts: Sequence[ZoneTerms]) -> FloatArray:
+        """(scans, scans) correlations of the solver's errors."""
+        drops = []
+        for zone, part in zip(self.zones, parts, strict=True):
+            radius, mass = zone.observed.radius, zone.observed.scan.projectile.mass
+            drops.append((part.reach, math.log(radius), math.log(mass / radius**3)))
+        return np.asarray(np.exp(-0.5 * measure_distances(drops)))
 
     def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
         """The move in two stated uncertainties of the speed."""
         assert block.nuisances is not None
-        spread = self.observed.scan.speed.sigma / self.observed.scan.speed.value
+        spread = np.array([zone.spread for zone in self.zones])
         best = np.clip(block.nuisances.T @ weighted, -3.0, 3.0)
         moved = self.begin() + best * spread
-        return moved, 0.5 * float(np.abs(moved - nuisances).max()) / spread
+        return moved, 0.5 * float((np.abs(moved - nuisances) / spread).max())
 
 
 def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:

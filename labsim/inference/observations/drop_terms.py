@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
@@ -19,6 +20,11 @@ SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guid
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error
 MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
 LEAST_SCATTER = 1e-9
+ALIKE = (
+    0.8,
+    2.0,
+    1.5,
+)  # ln of final depth over tip radius, of radius, of mass over its cube: so far two codes differ alike
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,14 @@ class DropTerms:
     tangents: Mapping[str, FloatArray]
     shared: Mapping[str, FloatArray]
     numerical: NumericalError
+
+
+def measure_distances(drops: Sequence[tuple[float, float, float]]) -> FloatArray:
+    """Squared distances (k, k) of drops, by which the solver errs alike in them: it does to exp(-½) at one.
+
+    drops : ln of final depth over tip radius, ln radius, ln of mass over radius cubed, of each.
+    """
+    return np.asarray(cdist(np.array(drops), np.array(drops), "seuclidean", V=np.square(ALIKE)) ** 2)
 
 
 def linearise_drop(

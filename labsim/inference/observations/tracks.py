@@ -12,7 +12,7 @@ docs/inference.md.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,15 +21,13 @@ from ..blocks import Block
 from ..forward import Instant
 from . import RunFeatures
 from .drop_model import DropModel
-from .drop_terms import DropTerms, NumericalError, Probe, Terms, linearise_drop
+from .drop_terms import DropTerms, NumericalError, Probe, Terms, linearise_drop, measure_distances
 
 
 @dataclass(frozen=True)
 class DropsBlock(Block):
-    """All drops about one point. sections : drop -> slice of the data; local : per drop, (points, nuisances) scaled by their
-    prior widths."""
+    """All drops about one point, each a section. local : per drop, (points, nuisances) scaled by their prior widths."""
 
-    sections: dict[str, slice] = field(default_factory=dict)
     local: tuple[FloatArray, ...] = ()
 
 
@@ -108,12 +106,9 @@ def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
     """The solver's error of the depth: as large as terms.numerical of the depth reached, alike for alike drops."""
     size = np.concatenate([part.size for part in parts])
     fraction = np.concatenate([part.fraction for part in parts])
-    apart = np.zeros((len(parts), len(parts)))  # the same for all points of two drops
-    for name, scale in (("reach", 0.8), ("radius", 2.0), ("mass", 1.5)):
-        value = np.array([getattr(part, name) for part in parts])
-        apart += (np.subtract.outer(value, value) / scale) ** 2
     counts = [part.size.size for part in parts]
     distance = np.subtract.outer(fraction, fraction) / 0.4
     distance *= distance
+    apart = measure_distances([(part.reach, part.radius, part.mass) for part in parts])
     distance += np.repeat(np.repeat(apart, counts, axis=0), counts, axis=1)
     return np.asarray(np.outer(size, size) * np.exp(-0.5 * distance))
