@@ -19,6 +19,7 @@ from ..effects import (
     read_model,
     reference_campaign,
 )
+from ..effects.terms import apply_law
 from ..errors import CampaignError, LabsimError
 from ..inference.planar import planar_setting
 from ..inference.published import impact_speed
@@ -271,4 +272,4 @@ def _extend(
         for name, _ in model.effects
         if not known[name].costs_runs
     ]
-    return apply_effects(setting, model.effects, place, known), lines
+    return apply_law(apply_effects(setting, model.effects, place, known), model.law), lines

@@ -11,6 +11,9 @@ import typer
 
 from ..campaign import read_campaign
 from ..effects import KINDS, Effect, Parameter, list_effects
+from ..effects.model import read_model
+from ..effects.terms import list_terms
+from ..errors import EffectError
 from ..report.phrases import shown_unit
 from . import options
 
@@ -20,6 +23,39 @@ KEY = (
     "Add your own as CAMPAIGN/effects/NAME.py (docs/effects.md)."
 )
 
+LEARNED = '''"""{term.title}, learned by labsim diagnose ({out}).
+
+{term.source}.
+"""
+
+from labsim.effects import Normal, Parameter
+from labsim.effects.terms import add_term, list_terms
+
+TERM = list_terms()["{name}"]
+
+title = "{term.title}"
+kind = "{kind}"
+parameters = (
+    Parameter(
+        "coefficient",
+        "{term.unit}",
+        null=0.0,
+        limits=({low:g}, {high:g}),
+        prior=Normal(0.0, {size:g}),
+        step={size:g},
+        symbol="c",
+        text="c times {term.formula}. As wide as what was learned is large; another campaign has to find it again.",
+    ),
+)
+leaves = "What no listed cause left in the campaign that it was learned from."
+references = ("{term.source}",)
+expect = {{}}
+
+
+def change_setting(setting, values, place):
+    return add_term(setting, TERM, values["coefficient"])
+'''
+
 
 def effects(
     campaign: Annotated[
@@ -28,10 +64,22 @@ def effects(
             help="Campaign folder: its own effects join, and numbers are its own. Default: a usual one."
         ),
     ] = None,
+    learned: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="Folder of a diagnosis that learned a formula: it becomes an effect of CAMPAIGN, or of the current folder.",
+        ),
+    ] = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:
     """List what the simulation may get wrong: name, parameter, prior and what each leaves in the data."""
+    if learned is not None:
+        written = write_learned(learned, campaign or Path())
+        lines = "\n".join(f"{path}: labsim diagnose tries it by name from now on" for path in written)
+        options.finish({"written": [str(path) for path in written]}, lines, as_json=as_json, quiet=quiet)
+        return
     read = read_campaign(campaign) if campaign is not None else None
     known = list_effects(read)
     reasons = {name: effect.applies(read) if read else "" for name, effect in known.items()}
@@ -65,6 +113,33 @@ def effects(
                 table.add_row(*(Text(cell) for cell in (name, f"{kind}: {effect.title}", *columns, leaves)))
     console.print(table)
     console.print(Text(KEY))
+
+
+def write_learned(out: Path, campaign: Path) -> list[Path]:
+    """Write each term of OUT's learned law as an effect of its own, CAMPAIGN/effects/NAME.py.
+
+    Raises EffectError where OUT holds no such law, or an effect of that name is there already.
+    """
+    file = out / "model.toml"
+    terms = read_model(file).law.terms
+    if not terms:
+        raise EffectError(file, "law", "holds no term; a diagnosis learns one where its verdict is unknown")
+    written = []
+    for name, coefficient in terms:
+        term, path = list_terms()[name], campaign / "effects" / f"learned_{name}.py"
+        if path.exists():
+            raise EffectError(path, "effects", "is there already; rename or remove it")
+        low, high = (min(max(limit, -1e9), 1e9) for limit in term.limits)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(
+            LEARNED.format(
+                term=term, name=name, out=out.name, low=low, high=high, size=float(f"{abs(coefficient):.3g}"),
+                kind="material" if term.place.startswith("strength") else "contact",
+            ),
+            encoding="utf-8",
+        )  # fmt: skip
+        written.append(path)
+    return written
 
 
 def _list_narrow(known: dict[str, Effect], reasons: dict[str, str]) -> str:

@@ -42,6 +42,7 @@ from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, judge, weigh_prior
+from .learned_law import LearnedLaw, learn_law
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, return_to_singles, settle_leading
 from .screen import CLOSE, Score, Screening, list_confusable, screen
@@ -88,13 +89,14 @@ class Diagnosis(Judgement):
     """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa.
 
     untestable : beside what was found; combination : what is measured although they may be there. misfit : of the nominal fit,
-    every observation and every drop.
+    every observation, every drop and map. learned : what is missing as a formula, where nothing listed explains the data.
     """
 
     confusable: list[tuple[str, str, float]]
     untestable: list[Untestable]
     combination: Combination | None
     misfit: list[Part]
+    learned: LearnedLaw | None
     held_out_nominal: HeldOut
     held_out_extended: HeldOut
     gain: Gain
@@ -255,6 +257,9 @@ def diagnose_campaign(
     )
     about = best if found.verdict.word == "effect" else nominal
     untestable = list_untestable(bench, about)
+    learned, tangents = None, found.unknown.tangents
+    if found.verdict.word == "unknown" and tangents is not None:
+        learned = learn_law(bench, nominal, tangents, held_nominal)
     doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]
@@ -270,6 +275,7 @@ def diagnose_campaign(
         untestable=untestable,
         combination=find_combination(bench, about, untestable),
         misfit=measure_misfit(bench, nominal),
+        learned=learned,
         held_out_nominal=held_nominal,
         held_out_extended=held_best,
         gain=measure_gain(held_nominal, held_best),

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
+from ..effects.terms import Knots, add_table
 from ..inference.fitting import Fit
 from ..inference.observations.compacted_zone import CompactedZones
 from ..inference.observations.tracks import Tracks
@@ -34,8 +35,6 @@ COMPACTION = (
 )  # above φ0: half of what a tip compacts ends below 0.03, nine tenths below 0.07
 DEPTHS = (0.0, 0.5, 1.0, 2.0, 4.0)  # tip radii
 SPEEDS = (0.1, 0.3, 0.6, 1.2)  # m/s; nought at rest: a force that does not change with speed is one of depth
-
-Knots = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -119,30 +118,17 @@ def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, f
         amplitude = values["amplitude"]
         if amplitude == 0.0:
             return setting
-        if law.over == "filling factor":
-            table = tuple((phi, 1.0 + amplitude * height) for phi, height in unit)
-            return setting.replace(strength_shape=combine(setting.strength_shape, table, product=True))
-        radius = setting.projectile.tip_radius
-        area = 2 * radius if setting.geometry == "planar" else math.pi * radius**2
-        reached = {"depth": deepest.get(setting, math.inf) / radius, "speed": FALLING * setting.impact_speed}
+        reached = {
+            "filling factor": math.inf,
+            "depth": deepest.get(setting, math.inf) / setting.projectile.tip_radius,
+            "speed": FALLING * setting.impact_speed,
+        }
         if reached[law.over] <= begins:
             return setting
-        if law.over == "depth":
-            table = tuple((knot * radius, amplitude * area * height) for knot, height in unit)
-            return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
-        table = tuple((knot, amplitude * area * height) for knot, height in unit)
-        return setting.replace(force_of_speed=combine(setting.force_of_speed, table))
+        null = 1.0 if law.over == "filling factor" else 0.0
+        return add_table(setting, law.name, tuple((knot, null + amplitude * height) for knot, height in unit))
 
     return change
-
-
-def combine(before: Knots, table: Knots, *, product: bool = False) -> Knots:
-    """Sum of two laws linear between knots, or their product at the knots of both."""
-    if not before:
-        return table
-    places = sorted({x for x, _ in (*before, *table)})
-    first, second = (np.interp(places, *np.asarray(each).T) for each in (before, table))
-    return tuple(zip(places, (first * second if product else first + second).tolist(), strict=True))
 
 
 def _give(parameters: tuple[Parameter, ...], campaign: Campaign) -> tuple[Parameter, ...]:

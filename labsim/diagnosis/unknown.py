@@ -51,7 +51,7 @@ class UnknownFit:
     """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean per datum of the drops, m.
 
     evidences : of every freedom, over its sizes; laws : what the data say of the laws of the best freedom that stands in the
-    equations, ``embedded``; empty where none was tried.
+    equations, ``embedded``; empty where none was tried. tangents : of all hats, where embedded laws were tried.
     """
 
     evidence: float
@@ -61,6 +61,7 @@ class UnknownFit:
     evidences: dict[str, float]
     embedded: str = ""
     laws: tuple[RecoveredLaw, ...] = ()
+    tangents: Tangents | None = None
 
 
 def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) -> UnknownFit:
@@ -97,13 +98,13 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
     for name, places in EMBEDDED.items():
         if tangents is None:
             break
-        laws = [law for law in tangents.laws if law.name in places and law.knots]
+        own = [law for law in tangents.laws if law.name in places and law.knots]
         hats = choose_hats(tangents, name)
         if not hats:
             continue
         each = [integrate(tangents, hats, size, (low, high)) for size in LAW_SIZES]
         terms[name] = [one.evidence for one in each]
-        embedded[name], mean = average(laws, each)
+        embedded[name], mean = average(own, each)
         top = max(each, key=lambda one: one.evidence)
         if best is None or top.evidence > best[0]:
             best = (
@@ -115,7 +116,8 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
     assert best is not None
     evidences = {name: log_mean(values) for name, values in terms.items()}
     nearest = max(embedded, key=lambda name: evidences[name], default="")
-    return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, embedded.get(nearest, ()))
+    laws = embedded.get(nearest, ())
+    return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, laws, tangents)
 
 
 def log_mean(values: Collection[float]) -> float:

@@ -9,12 +9,20 @@
     eta = 0.052
     n = 0.5
 
+    [law]
+    inertial_drag = 120.0
+    force_of_depth = [[0.0, 0.0], [1.0, 80.0], [2.0, 0.0]]
+
+Under [law] stand coefficients of terms (effects/terms/), and tables at knots: ``strength_of_filling_factor`` (filling factor,
+strength over what p_m gives minus one), ``force_of_depth`` (tip radii, Pa), ``force_of_speed`` (m/s, Pa).
+
 ``labsim diagnose`` writes it, ``labsim simulate --model`` and ``labsim calibrate --model`` take it, people may write it.
 """
 
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,18 +37,22 @@ from ..sph import DropSetting
 from ..text_files import load_toml
 from .contract import Effect, Instrument, Place, Values
 from .loading import list_effects
+from .terms import LEAST, PLACES, Knots, Law, apply_law, list_terms
 
 FORMAT = 1
 P_M_RANGE = (1.0, 1.0e8)  # Pa
+NO_LAW = Law()
 
 
 @dataclass(frozen=True)
 class Model:
-    """p_m in Pa; effects as (name, values by parameter); material as (field of Material, value) besides p_m."""
+    """p_m in Pa; effects as (name, values by parameter); material as (field of Material, value) besides p_m; law : what stands in
+    the equations beside them."""
 
     p_m: float
     effects: tuple[tuple[str, Values], ...] = ()
     material: tuple[tuple[str, float], ...] = ()
+    law: Law = NO_LAW
 
 
 def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) -> Model:
@@ -48,7 +60,7 @@ def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) ->
     path = Path(path)
     known = effects if effects is not None else list_effects()
     document = load_toml(path, EffectError, "name a model.toml as labsim diagnose writes it")
-    _refuse_others(path, "", document, ("format", "material", "effects"))
+    _refuse_others(path, "", document, ("format", "material", "effects", "law"))
     if document.get("format", FORMAT) != FORMAT:
         raise EffectError(
             path, "format", f"{document['format']!r} is not a format this labsim reads; write {FORMAT}"
@@ -90,7 +102,46 @@ def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) ->
                 },
             )
         )
-    return Model(p_m, tuple(chosen), fields)
+    return Model(p_m, tuple(chosen), fields, _read_law(path, _table(path, "law", document.get("law", {}))))
+
+
+def _read_law(path: Path, table: Mapping[str, Any]) -> Law:
+    known = list_terms()
+    places = {place.replace(" ", "_"): place for place in PLACES}
+    _refuse_others(path, "law", table, [*places, *known])
+    terms = []
+    for name, value in table.items():
+        if name in known:
+            terms.append((name, _number(path, f"law.{name}", value, *known[name].limits)))
+    tables = [(places[key], _read_knots(path, f"law.{key}", table[key])) for key in table if key in places]
+    for place, knots in tables:
+        for knot, value in knots:
+            if place == "force of speed" and value < 0:
+                raise EffectError(
+                    path,
+                    "law.force_of_speed",
+                    f"{value:g} Pa at {knot:g} m/s pushes along the motion; write 0 or more",
+                )
+            if place == "strength of filling factor" and value < LEAST - 1:
+                raise EffectError(
+                    path,
+                    "law.strength_of_filling_factor",
+                    f"{value:g} at {knot:g} leaves no strength; write {LEAST - 1:g} or more",
+                )
+    return Law(tuple(terms), tuple(tables))
+
+
+def _read_knots(path: Path, key: str, value: Any) -> Knots:
+    if (
+        not isinstance(value, list)
+        or len(value) < 2
+        or not all(isinstance(k, list) and len(k) == 2 for k in value)
+    ):
+        raise EffectError(path, key, f"{value!r} is no table; write [[place, value], [place, value], ...]")
+    knots = tuple((_number(path, key, x, 0.0, 1e3), _number(path, key, y, -1e6, 1e6)) for x, y in value)
+    if any(after <= before for (before, _), (after, _) in itertools.pairwise(knots)):
+        raise EffectError(path, key, "has places that do not grow; sort them, each once")
+    return knots
 
 
 def write_model(
@@ -113,6 +164,14 @@ def write_model(
         lines += ["", f"[effects.{name}]  # {effect.title}"]
         for key, value in values.items():
             lines.append(f"{key} = {float(value)!r}  # {effect.parameter(key).unit}")
+    if model.law != NO_LAW:
+        lines += ["", "[law]"]
+    for name, value in model.law.terms:
+        term = list_terms()[name]
+        lines.append(f"{name} = {float(value)!r}  # {term.unit}, times {term.formula}: {term.title}")
+    for place, knots in model.law.tables:
+        rows = ", ".join(f"[{float(x)!r}, {float(y)!r}]" for x, y in knots)
+        lines.append(f"{place.replace(' ', '_')} = [{rows}]  # {PLACES[place][0]}, {PLACES[place][1]}")
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     os.replace(aside, path)
@@ -144,9 +203,11 @@ def apply_effects(
 def apply_model(
     setting: DropSetting, model: Model, place: Place, effects: Mapping[str, Effect] | None = None
 ) -> DropSetting:
-    """The drop as the model has it: its p_m and material, then its effects."""
+    """The drop as the model has it: its p_m and material, then its effects, then its law."""
     material = setting.material.replace(p_m=model.p_m, **dict(model.material))
-    return apply_effects(setting.replace(material=material), model.effects, place, effects)
+    return apply_law(
+        apply_effects(setting.replace(material=material), model.effects, place, effects), model.law
+    )
 
 
 def make_instrument(model: Model, place: Place, effects: Mapping[str, Effect] | None = None) -> Instrument:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..effects import Effect, list_effects, list_places
 from ..effects.model import Model, apply_effects, check_model
+from ..effects.terms import apply_law
 from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..sph import DropSetting
@@ -112,7 +113,8 @@ def extend(bench: Workbench, model: Model) -> None:
 
     def apply(setting: DropSetting) -> DropSetting:
         setting = setting.replace(material=setting.material.replace(**dict(model.material)))
-        return apply_effects(setting, held, bench.place_of(setting.projectile.tip), bench.effects)
+        setting = apply_effects(setting, held, bench.place_of(setting.projectile.tip), bench.effects)
+        return apply_law(setting, model.law)
 
     bench.model = model
     bench.grid.extension = apply

@@ -13,13 +13,14 @@ from ..diagnosis.gain import Gain
 from ..diagnosis.misfit import say_misfit
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
+from ..effects.terms import Law
 from ..inference.calibrate import Calibration
 from ..inference.posterior import Posterior
 from ..inference.summary import summarise
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from ..sph import solver_hash
-from .law_words import comes_nearest, describe_unknown, say_missing
+from .law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
 from .phrases import CERTAIN, say_amount, say_combination, say_hypothesis, say_probability
 
 NUMERICAL_DEPTH = (
@@ -132,6 +133,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "causes": causes,
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
+        "law": describe_learned(found),
         "misfit": [asdict(part) for part in found.misfit],
         "not_testable": [
             {
@@ -265,6 +267,7 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         lines.append(f"  the nominal model {missed}")
     for first, second, cosine in found.confusable[:4]:
         lines.append(f"  hard to tell apart here: {first} and {second} (cosine {cosine:+.2f})")
+    lines += [f"  {text}" for text in say_learned(found)]
     lines += _say_untestable(found)
     if suggestions:
         lines.append(
@@ -291,7 +294,13 @@ def _say_untestable(found: Diagnosis) -> list[str]:
 
 
 def extended_model(found: Diagnosis) -> Model:
-    """The extension as model.toml holds it."""
+    """The extension as model.toml holds it: the cause, or the law that was learned in its place."""
+    if found.verdict.word == "unknown" and found.learned is not None:
+        learned = found.learned.best
+        terms = tuple(
+            (term.name, float(c)) for term, c in zip(learned.terms, learned.coefficients, strict=True)
+        )
+        return Model(math.exp(learned.fit.log_p_m), law=Law(terms))
     effects = tuple(
         (name, found.bench.effects[name].at(found.bench.at(name, found.best.values[name])))
         for name in (found.best.hypothesis if found.verdict.word == "effect" else ())

@@ -10,6 +10,7 @@ import numpy as np
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.free_law import EMBEDDED, RecoveredLaw
 from ..diagnosis.judge import PREDICTED
+from ..diagnosis.learned_law import Formula
 from .page import show_number
 
 MISSING = {
@@ -18,6 +19,11 @@ MISSING = {
     "undisturbed dust": "a layering of the dust that was there before the drop",
     "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
     "speed, about {size} % of the depth",
+}
+PLACE_WORDS = {
+    "strength of filling factor": "a compressive strength that is more than p_m gives by a share of",
+    "force of depth": "a force upwards on the tip, over its cross-section, of",
+    "force of speed": "a force against the motion, over the tip's cross-section, of",
 }
 CLEAR = 2.0  # standard deviations from which a further law of several is named
 
@@ -33,6 +39,8 @@ def say_missing(found: Diagnosis) -> str:
     missed = [part.name for part in parts if part.missed]
     if missed and not any(part.missed for part in parts if part.kind == "drops"):
         return f"shows in {' and '.join(missed)} alone: p_m explains the drops"
+    if found.learned is not None:
+        return f"is like {say_formula(found.learned.best)}"
     if not is_embedded(found):
         return "looks like " + MISSING[unknown.block].format(size=f"{100 * unknown.size:.0f}")
     first, *rest = _rank(found)
@@ -123,6 +131,69 @@ def describe_unknown(found: Diagnosis) -> dict[str, Any]:
     }
 
 
+def say_formula(formula: Formula) -> str:
+    """What is added to the equations, with coefficients ± standard deviations."""
+    said = []
+    for term, c, sigma in zip(formula.terms, formula.coefficients, formula.sigma, strict=True):
+        digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
+        unit = "" if term.unit == "1" else f" {term.unit}"
+        times = "" if term.formula == "1" else f" × {term.formula}"
+        said.append(f"{PLACE_WORDS[term.place]} ({c:.{digits}f} ± {sigma:.{digits}f}){unit}{times}")
+    return " and ".join(said)
+
+
+def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
+    """For diagnosis.json: the formula with its coefficients, rivals and held-out drops; None where none was learned."""
+    learned = found.learned
+    if learned is None:
+        return None
+    best = learned.best
+    log_p_m, sigma = best.fit.log_p_m, math.sqrt(best.fit.covariance[0, 0])
+    return {
+        "terms": [
+            {"term": term.name, "coefficient": float(c), "sd": float(sd), "unit": term.unit}
+            for term, c, sd in zip(best.terms, best.coefficients, best.sigma, strict=True)
+        ],
+        "formula": say_formula(best),
+        "place": " and ".join(dict.fromkeys(term.place for term in best.terms)),
+        "log_bayes": best.fit.evidence - found.nominal.evidence,
+        "p_m_Pa": {"mean": math.exp(log_p_m), "sd": math.exp(log_p_m) * sigma},
+        "rivals": [
+            {
+                "terms": [term.name for term in each.terms],
+                "formula": say_formula(each),
+                "log_evidence_behind": best.fit.evidence - each.fit.evidence,
+            }
+            for each in learned.formulas[1:]
+        ],
+        "held_out": {
+            "rms_before_m": best.gain.rms_nominal,
+            "rms_after_m": best.gain.rms_extended,
+            "rms_noise_m": best.gain.rms_noise,
+        },
+    }
+
+
+def say_learned(found: Diagnosis) -> list[str]:
+    """What was learned, in lines; none where nothing was."""
+    if found.learned is None:
+        return []
+    best, alike = found.learned.best, found.learned.alike
+    before, after, noise = (
+        show_number(1e6 * rms, "{:.1f}")
+        for rms in (best.gain.rms_nominal, best.gain.rms_extended, best.gain.rms_noise)
+    )
+    p_m, sigma = math.exp(best.fit.log_p_m) / 1e3, math.sqrt(best.fit.covariance[0, 0])
+    said = [
+        f"a formula for what is missing: {say_formula(best)}",
+        f"with it held-out drops are missed by {after} µm rms, by {before} µm without, by {noise} µm were it the truth; "
+        f"p_m is {p_m:.3g} ± {p_m * sigma:.2g} kPa",
+    ]
+    if alike:
+        said.append(f"hardly told from it here: {'; '.join(map(say_formula, alike))}")
+    return said
+
+
 def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
     """Words and captions of the page's section on the free law; None where there is nothing to draw."""
     unknown = found.unknown
@@ -152,7 +223,12 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
                 "text": f"{_begin(value_label(law))} against {place_label(law)}: {points}. The band holds 68 %.",
             }
         )
-    return {"words": words, "rows": rows}
+    learned = [*say_learned(found), "labsim simulate --model model.toml simulates a drop with it"]
+    return {
+        "words": words,
+        "rows": rows,
+        "learned": " ".join(f"{_begin(text)}." for text in learned) if found.learned else "",
+    }
 
 
 def _begin(words: str) -> str:

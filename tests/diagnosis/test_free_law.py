@@ -14,9 +14,12 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis import free_law
 from labsim.diagnosis.campaign import judge_campaign
 from labsim.diagnosis.free_law import EMBEDDED, Tangents, average, gather, integrate, is_wanted
-from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, combine, make_hats
+from labsim.diagnosis.gain import predict_held_out
+from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, make_hats
+from labsim.diagnosis.learned_law import learn_law
 from labsim.diagnosis.unknown import FREEDOMS
 from labsim.effects import Place, list_effects
+from labsim.effects.terms import combine
 from labsim.inference.blocks import Block, solve_globals
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
@@ -253,3 +256,13 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     peak = int(np.argmax(mean))
     assert mean[peak] > 1.5 * sigma[peak]
     assert not any(name in found.bench.effects for law in LAWS for name in law.hats)
+    # what is learned in its place: a force of depth with its peak in the film, by which held-out drops are predicted
+    assert unknown.tangents is not None
+    learned = learn_law(bench, found.nominal, unknown.tangents, predict_held_out(bench, found.nominal))
+    assert learned is not None
+    best = learned.best
+    assert {term.place for term in best.terms} == {"force of depth"}
+    drawn = sum(c * term.shape(place) for term, c in zip(best.terms, best.coefficients, strict=True))
+    assert BEGIN < place[np.argmax(drawn)] < END
+    assert best.gain.rms_extended < 0.5 * best.gain.rms_nominal
+    assert not any(term.name in bench.effects for term in best.terms)

@@ -30,6 +30,7 @@ def found():
     return SimpleNamespace(
         unknown=SimpleNamespace(block="strength and forces", laws=laws, evidences=evidences, size=0.4),
         misfit=[Part("drops", "drops", 300.0, 100, 1e-9)],
+        learned=None,
     )
 
 

@@ -1,0 +1,25 @@
+"""Forces against the motion that grow with the speed."""
+
+import numpy as np
+
+from . import Term
+
+PLACE = "force of speed"
+TERMS = (
+    Term(
+        "inertial_drag", "a drag that grows with the square of the speed", PLACE, "Pa s²/m²", "v²",
+        lambda v: v**2, "Momentum given to the dust ahead: Katsuragi & Durian 2007, Nature Physics 3, 420",
+    ),
+    Term(
+        "viscous_drag", "a drag that grows with the speed", PLACE, "Pa s/m", "v",
+        lambda v: v, "Gas in the pores, and the published F = A c v: Güttler et al. 2009, ApJ 701, 130",
+    ),
+    Term(
+        "root_drag", "a drag that grows with the root of the speed", PLACE, "Pa (s/m)^½", "√v",
+        lambda v: np.sqrt(v), "Strength that grows with a power of the rate of strain",
+    ),
+    Term(
+        "drag_above_half", "a drag that begins at 0.5 m/s", PLACE, "Pa s/m", "(v − 0.5 m/s), where that is positive",
+        lambda v: np.maximum(v - 0.5, 0.0), "A threshold of speed, as for fracture or fluidisation",
+    ),
+)  # fmt: skip

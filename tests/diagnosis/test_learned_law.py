@@ -1,0 +1,83 @@
+"""A formula is chosen among terms: on tangents of a made-up campaign where the answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from labsim.diagnosis.free_law import Tangents, gather
+from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, STEP, FreeLaw
+from labsim.diagnosis.learned_law import USUAL, find_peak, make_effect, weigh_formulas
+from labsim.effects.terms import add_term, list_terms
+from labsim.inference.blocks import Block
+from labsim.records import Material, Projectile
+from labsim.sph import DropSetting
+
+LAWS = (
+    FreeLaw("force of depth", "depth", "tip radii", DEPTHS, DEPTHS, (0.0, 4.0), "Pa", PRESSURE),
+    FreeLaw("force of speed", "speed", "m/s", (0.0, *SPEEDS), SPEEDS, (0.0, 1.2), "Pa", PRESSURE),
+)
+HATS = [hat for law in LAWS for hat in law.hats]
+TERMS = {name: term for name, term in list_terms().items() if term.place in {law.name for law in LAWS}}
+PEAKS = {
+    name: find_peak(term, next(law for law in LAWS if law.name == term.place)) for name, term in TERMS.items()
+}
+LIMITS = (-50.0, 50.0)
+
+
+def made_up(hidden: dict[str, float], seed: int = 2) -> Tangents:
+    """300 data with errors of 1; each hat leaves a trace of its own of 8 per unit. hidden : term -> units where it is largest."""
+    rng = np.random.default_rng(seed)
+    tangents = {name: 8.0 * rng.standard_normal(300) for name in ("ln_p_m", *HATS)}
+    residual = rng.standard_normal(300)
+    for name, size in hidden.items():
+        term = TERMS[name]
+        law = next(law for law in LAWS if law.name == term.place)
+        for hat, share in zip(law.hats, term.shape(np.array(law.knots)) / PEAKS[name], strict=True):
+            residual += size * share * tangents[hat]
+    block = Block(residual, np.eye(300), tangents)
+    gram, log_determinant, points = gather([block], HATS, dict.fromkeys(HATS, 1.0))
+    return Tangents(LAWS, ("ln_p_m", *HATS), gram, log_determinant, points, np.zeros((0, len(HATS))), 0.0)
+
+
+@pytest.mark.parametrize("name", ["inertial_drag", "root_drag", "depth_spring", "film_at_1", "surface_layer"])
+def test_the_hidden_term_comes_first_with_its_size(name):
+    ranked = weigh_formulas(made_up({name: 0.5}), TERMS, PEAKS, LIMITS)
+    names, marginal = ranked[0]
+    assert names == (name,)
+    sigma = np.sqrt(marginal.covariance[1, 1])
+    assert abs(marginal.coefficients[1] - 0.5) < 3 * sigma and sigma < 0.05
+
+
+def test_two_hidden_terms_are_named_together():
+    ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "film_at_2": -0.4}), TERMS, PEAKS, LIMITS)
+    assert set(ranked[0][0]) == {"inertial_drag", "film_at_2"}
+
+
+def test_a_force_along_the_motion_is_never_proposed():
+    """It would gain energy on a closed way; of depth either sign is a force that nature has."""
+    for names, marginal in weigh_formulas(made_up({"inertial_drag": -0.5}), TERMS, PEAKS, LIMITS):
+        for name, c in zip(names, marginal.coefficients[1:], strict=True):
+            assert c >= 0 or TERMS[name].place == "force of depth"
+    names, marginal = weigh_formulas(made_up({"depth_spring": -0.5}), TERMS, PEAKS, LIMITS)[0]
+    assert names == ("depth_spring",) and marginal.coefficients[1] < 0
+
+
+def test_where_nothing_is_hidden_no_pair_stands_out():
+    """A second term has to promise 3 in ln evidence over the better of the two."""
+    pairs = 0
+    for seed in range(4):
+        ranked = weigh_formulas(made_up({}, seed), TERMS, PEAKS, LIMITS)
+        pairs += len(ranked[0][0]) - 1
+    assert pairs <= 1
+
+
+def test_a_term_as_an_effect_is_the_term():
+    term = TERMS["inertial_drag"]
+    effect = make_effect(term, 250.0)
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.6, Material())
+    assert effect.apply(setting, {"coefficient": 0.0}, None) == setting
+    assert effect.apply(setting, {"coefficient": 120.0}, None) == add_term(setting, term, 120.0)
+    parameter = effect.amplitudes[0]
+    assert parameter.limits[0] == 0.0 and parameter.step == STEP * 250.0
+    assert parameter.prior.sd == USUAL * 250.0
