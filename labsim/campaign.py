@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .acceleration import check_acceleration, read_accelerometer
 from .campaign_scans import read_scan
 from .campaign_strength import read_strength_tests
 from .campaign_tables import (
@@ -104,7 +105,7 @@ def read_drop(path: Path | str) -> Drop:
     document = Document(file)
     document.top()
     record_table = document.table("record")
-    kind = record_table.choice("kind", ("track", "video", "summary"))
+    kind = record_table.choice("kind", ("track", "video", "acceleration", "summary"))
     campaign = file.resolve().parents[2] if len(file.resolve().parents) > 2 else None
     projectile = read_projectile(document.table("projectile"), campaign)
     motion = read_motion(document.table("motion", required=False), campaign, file.parent)
@@ -113,9 +114,14 @@ def read_drop(path: Path | str) -> Drop:
         "sequence", 0, 100000, whole=True
     )  # fmt: skip
     height = drop.measured(
-        "height_mm", 0.0, 5000.0, unit=1e-3, required=kind != "summary" and motion.kind == "free"
+        "height_mm",
+        0.0,
+        5000.0,
+        unit=1e-3,
+        required=kind in ("track", "video") and motion.kind == "free",
     )
-    camera, published = None, None
+    speed = drop.measured("impact_speed_m_s", 1e-3, 100.0, required=False) if kind != "summary" else None
+    camera, published, accelerometer = None, None, None
     if kind == "summary":
         if document.has("camera"):
             raise CampaignError(file, "[camera]", 'does not belong to a record of kind "summary"; remove it')
@@ -123,6 +129,14 @@ def read_drop(path: Path | str) -> Drop:
         if record_table.has("file"):
             record_table.get("file")
         published = read_published(document.table("published"), height is not None)
+    elif kind == "acceleration":
+        for other in ("camera", "published"):
+            if document.has(other):
+                raise CampaignError(
+                    file, f"[{other}]", 'does not belong to a record of kind "acceleration"; remove it'
+                )
+        record = Record(kind="acceleration", path=_existing(record_table, file.parent, folder_allowed=False))
+        accelerometer = read_accelerometer(record_table)
     else:
         if document.has("published"):
             raise CampaignError(
@@ -139,6 +153,8 @@ def read_drop(path: Path | str) -> Drop:
     document.close()
     if kind == "track":
         _check_track(record.path, camera)  # type: ignore[arg-type]
+    if record.path is not None and accelerometer is not None:
+        check_acceleration(record.path, accelerometer)
     return Drop(
         name=file.parent.name,
         projectile=projectile,
@@ -149,6 +165,8 @@ def read_drop(path: Path | str) -> Drop:
         published=published,
         source=source,
         motion=motion,
+        accelerometer=accelerometer,
+        impact_speed=speed,
     )
 
 

@@ -106,10 +106,32 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class Record:
-    """Where the record of a drop is: ``kind`` is "track", "video" or "summary"."""
+class Sensor:
+    """One sensor of an accelerometer. sigma (of a sample), offset_sigma, range : m/s²; scale_sigma : relative."""
 
-    kind: Literal["track", "video", "summary"]
+    column: str
+    sigma: float
+    offset_sigma: float
+    scale_sigma: float
+    range: float  # readings beyond it mean nothing; inf where none is stated
+
+
+@dataclass(frozen=True)
+class Accelerometer:
+    """What stands on the projectile. sensors : of one record, finest range first; unit : m/s² of one of its numbers;
+    reads_at_rest : m/s² upwards, gravity or nothing."""
+
+    time_column: str
+    sensors: tuple[Sensor, ...]
+    unit: float
+    reads_at_rest: float
+
+
+@dataclass(frozen=True)
+class Record:
+    """Where the record of a drop is: ``kind`` is "track", "video", "acceleration" or "summary"."""
+
+    kind: Literal["track", "video", "acceleration", "summary"]
     path: Path | None = None
     row_sigma: float | None = None  # px
 
@@ -136,6 +158,8 @@ class Drop:
         default_factory=dict
     )  # [source] as written: where each figure comes from, what is assumed
     motion: Motion = Motion()
+    accelerometer: Accelerometer | None = None
+    impact_speed: Measured | None = None  # m/s, where it was measured beside the record
 
 
 @dataclass(frozen=True)

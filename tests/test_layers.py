@@ -14,7 +14,7 @@ FLOORS = [
     {"tables", "tiff_pages", "tracks"},
     {"video", "ct", "sph"},  # siblings that never import each other
     {"own_keys"},
-    {"campaign_tables", "repeated_records"},
+    {"campaign_tables", "repeated_records", "acceleration"},
     {"campaign_scans", "campaign_strength"},
     {"campaign"},
     {"effects", "tracking"},

@@ -74,6 +74,19 @@ kind = "track"                      # "track": a table; "video": a file or a fol
 file = "track.csv"                  # beside this file; a track has the columns frame,tip_row_px, one row a frame
 row_sigma_px = 0.1                  # optional: standard error of a row
 
+# [record]                          # instead: an accelerometer on the projectile; then without [camera]
+# kind = "acceleration"
+# file = "acceleration.csv"           # beside this file; a heading, then one row a sample
+# time_column = "time_s"              # in seconds
+# acceleration_column = "a_g"         # upwards positive; ["low_g", "high_g"] for several sensors
+# unit = "g"                          # or "m/s^2", of the column and of the four keys below
+# reads_at_rest = 1.0                 # 1.0: a sensor at rest reads 1 g upwards; 0.0: nothing
+# sigma = 0.05                        # noise of a sample; like the next three a list where there are several sensors
+# offset_sigma = 0.05                 # how well the zero is known
+# scale_sigma = 0.01                  # how well the scale is known, relative
+# range = 50.0                        # optional: largest reading
+# [drop] then also takes impact_speed_m_s and impact_speed_sigma_m_s, and height_mm is optional
+
 # [published]                       # only with kind = "summary", which has no [camera]; at least depth or stopping time
 # penetration_depth_mm = 0.85
 # penetration_depth_sigma_mm = 0.03

@@ -52,6 +52,7 @@ class _HeldDrop:
     weights: FloatArray  # (held, seen) of its own errors that the others tell
     covariance: FloatArray  # (k, k) of the globals without it
     spread: FloatArray  # (held, held) of its prediction
+    lengths: FloatArray  # (held, held) that turns an error of its data into m, as depth or by integration
 
     def miss(self, residual: FloatArray, pull: FloatArray) -> FloatArray:
         """Data minus prediction, (held, ...), for residuals (n, ...) and what scans and priors say of the globals, (k, ...)."""
@@ -79,9 +80,8 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
     drops = []
     for model in bench.tracks.models:
         section = linear.sections[model.observed.name]
-        data = model.matrix @ model.observed.depth
         below = np.zeros(section.stop - section.start, dtype=bool)
-        below[: data.size] = data > 3 * model.observed.sigma
+        below[: model.data.size] = model.below
         held = np.zeros(linear.residual.size, dtype=bool)
         held[section] = below
         seen = ~held
@@ -92,7 +92,8 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
         weights = cho_solve(factor, cross.T).T
         reach = design[held] - cross @ solved
         spread = linear.covariance[np.ix_(held, held)] - weights @ cross.T + reach @ covariance @ reach.T
-        drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread))
+        lengths = model.lengths[np.ix_(model.below, model.below)]
+        drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread, lengths))
     return drops, pull, precision
 
 
@@ -114,8 +115,8 @@ def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> Held
         score.append(
             -0.5 * white @ white - np.sum(np.log(np.diag(lower))) - 0.5 * error.size * math.log(2 * math.pi)
         )
-        rms.append(math.sqrt(np.mean(error**2)))
-        expected.append(math.sqrt(np.mean(np.diag(drop.spread))))
+        rms.append(math.sqrt(np.mean((drop.lengths @ error) ** 2)))
+        expected.append(math.sqrt(np.mean(np.diag(drop.lengths @ drop.spread @ drop.lengths.T))))
         count.append(error.size)
     return HeldOut(names, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
 
@@ -133,8 +134,8 @@ def check_prediction(bench: Workbench, fit: Fit, random: np.random.Generator, dr
     residuals = lower @ random.standard_normal((len(lower), draws))
     values, axes = np.linalg.eigh(precision)
     pulls = axes * np.sqrt(np.maximum(values, 0.0)) @ random.standard_normal((len(values), draws))
-    seen = sum(float(np.sum(drop.miss(fit.drops.residual, pull) ** 2)) for drop in drops)
-    drawn = sum(np.sum(drop.miss(residuals, pulls) ** 2, axis=0) for drop in drops)
+    seen = sum(float(np.sum((drop.lengths @ drop.miss(fit.drops.residual, pull)) ** 2)) for drop in drops)
+    drawn = sum(np.sum((drop.lengths @ drop.miss(residuals, pulls)) ** 2, axis=0) for drop in drops)
     return float((1 + np.count_nonzero(drawn >= seen)) / (1 + draws))
 
 

@@ -66,7 +66,7 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
         if isinstance(observation, Tracks):
             instants = observation.instants(nuisances)
             fastest = max([fastest, *(math.exp(instant.log_speed) for instant in instants)])
-            depths = (float(np.max(model.observed.depth)) / model.radius for model in observation.models)
+            depths = (model.deepest / model.radius for model in observation.models)
             deepest = max([deepest, *depths])
         elif isinstance(observation, CompactedZones):
             observed = [zone.observed for zone in observation.zones]

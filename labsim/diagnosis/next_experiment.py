@@ -14,9 +14,11 @@ import numpy as np
 
 from ..inference.curves import FRACTIONS
 from ..inference.fitting import Fit
+from ..inference.observe import ObservedDrop
 from ..inference.workbench import Workbench
 from ..records import STANDARD_GRAVITY, FloatArray
 
+USUAL_SIGMA = 2e-6  # m, of a camera where no drop had one
 WORTHWHILE = 0.01  # bits below which an experiment is not suggested
 SMALLEST = 0.005  # probability below which a hypothesis is left out
 POINTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])  # fractions of the stop that are compared
@@ -84,7 +86,8 @@ def _spread(bench: Workbench, fits: list[Fit], number: int, speed: float, mean: 
     """Covariance of such a measurement: localisation, sample scatter, numerical error, uncertainty of p_m."""
     base, moved = (_predict(bench, fits[0], number, speed, shift) for shift in (0.0, 0.01))
     tangent = (moved - base) / 0.01
-    white = np.median([model.observed.sigma for model in bench.tracks.models])
+    cameras = [drop.sigma for drop in bench.drops if isinstance(drop, ObservedDrop)]
+    white = np.median(cameras) if cameras else USUAL_SIGMA
     variance = bench.terms.scatter**2 + fits[0].covariance[0, 0]
     numerical = bench.terms.numerical * mean
     return (

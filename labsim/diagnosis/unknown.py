@@ -134,7 +134,8 @@ def loosen(block: Block, size: float) -> Block:
 
 
 def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
-    """Per datum: depth reached (m), fraction of the way, ln of speed² over radius, ln radius, ln mass per radius³."""
+    """Per datum: depth reached (m; of an accelerometer the acceleration, m/s²), fraction of the way,
+    ln of speed² over radius, ln radius, ln mass per radius³."""
     parts: dict[str, list[FloatArray]] = {
         "reached": [],
         "fraction": [],
@@ -146,12 +147,12 @@ def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
     for model, instant in zip(tracks.models, tracks.instants(fit.nuisances[0]), strict=True):
         section = fit.drops.sections[model.observed.name]
         n = section.stop - section.start
-        data = model.matrix @ model.observed.depth
         reached = np.zeros(n)
-        reached[: data.size] = np.maximum(data, 0.0)
-        final = reached.max()
+        reached[: model.size.size] = model.size
+        fraction = np.zeros(n)
+        fraction[: model.way.size] = model.way
         parts["reached"].append(reached)
-        parts["fraction"].append(reached / final)
+        parts["fraction"].append(fraction)
         mass = model.observed.drop.projectile.mass
         for key, value in (
             ("speed", instant.log_speed - 0.5 * math.log(model.radius)),

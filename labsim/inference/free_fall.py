@@ -13,6 +13,7 @@ import numpy as np
 
 from ..records import STANDARD_GRAVITY, Measured
 from .observe import ObservedDrop
+from .observe_acceleration import ObservedImpact
 
 STRAY = 4.0  # standard deviations from the middle of all drops: that drop's own fault
 SMALL_SHARE = 0.01  # relative: what is smaller is not worth a word
@@ -37,12 +38,12 @@ def agrees(ratio: Measured, middle: float) -> bool:
     return abs(ratio.value - middle) <= max(STRAY * ratio.sigma, SMALL_SHARE)
 
 
-def doubt_scales(drops: Sequence[ObservedDrop]) -> list[str]:
+def doubt_scales(drops: Sequence[ObservedDrop | ObservedImpact]) -> list[str]:
     """One line where free fall shows different g in different drops, naming those off the middle of all."""
     shown = [
         (drop.name, Measured(g.value / STANDARD_GRAVITY, g.sigma / STANDARD_GRAVITY))
         for drop in drops
-        if (g := drop.curve.apparent_gravity) is not None
+        if drop.curve is not None and (g := drop.curve.apparent_gravity) is not None
     ]
     common = pool([ratio for _, ratio in shown])
     if common is None:

@@ -9,13 +9,14 @@ from ..errors import MeasurementError
 from ..records import Campaign
 from .observations.undisturbed import UndisturbedDust, observe_undisturbed
 from .observe import ObservedDrop, observe_drops
+from .observe_acceleration import ObservedImpact
 
 
 @dataclass
 class Measurements:
     """drops to be compared; reduced scans; dust : their undisturbed part; warnings : what had to be left out."""
 
-    drops: list[ObservedDrop]
+    drops: list[ObservedDrop | ObservedImpact]
     reduced: list[ReducedScan] = field(default_factory=list)
     dust: list[UndisturbedDust] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

@@ -14,6 +14,7 @@ from ..errors import MeasurementError
 from ..records import Campaign, DecelerationCurve, Drop, FloatArray, Track
 from ..video.curve import fit_deceleration
 from ..video.track_file import read_track
+from .observe_acceleration import ObservedImpact, observe_impact
 
 MARGIN = 4  # frames kept after the depth has stopped growing
 # Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
@@ -102,18 +103,21 @@ def read_observed_track(drop: Drop) -> Track:
     return track_projectile(open_frames(drop.record.path), frame_rate=drop.camera.frame_rate)
 
 
-def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
+def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop | ObservedImpact], list[str]]:
     """Every drop that shows something; a line for each that does not, and for each thing that its track warns of.
 
     Raises MeasurementError where none does: the first one's.
     """
-    seen: list[ObservedDrop] = []
+    seen: list[ObservedDrop | ObservedImpact] = []
     failures: list[tuple[str, MeasurementError]] = []
     for drop in campaign.drops:
         if drop.record.kind == "summary":
             continue
         try:
-            seen.append(observe_drop(drop, read_observed_track(drop)))
+            if drop.accelerometer is not None:
+                seen.append(observe_impact(drop))
+            else:
+                seen.append(observe_drop(drop, read_observed_track(drop)))
         except MeasurementError as error:
             failures.append((drop.name, error))
     if failures and not seen:
@@ -122,7 +126,7 @@ def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop], list[str]]:
     lines += [
         f"drop {drop.name}: {text}"
         for drop in seen
-        for text in drop.curve.warnings
+        for text in (drop.impact if isinstance(drop, ObservedImpact) else drop.curve).warnings
         if not any(words in text for words in SAID_ELSEWHERE)
     ]
     return seen, lines

@@ -18,12 +18,14 @@ from .curves import encode_run
 from .forward import ResponseTable
 from .grid import Family, RunGrid, few_positions, speed_nodes
 from .observations import Observation, RunFeatures, observe_further
+from .observations.acceleration_model import AccelerationModel, make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
-from .observations.drop_model import make_drop_model
+from .observations.drop_model import DropModel, make_drop_model
 from .observations.drop_terms import Terms
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
 from .observe import ObservedDrop, observe_drops
+from .observe_acceleration import ObservedImpact
 from .runs import Progress, RunStore
 from .supported import refuse_others
 from .workbench import Workbench
@@ -43,7 +45,7 @@ def open_workbench(
     scheduler: str | None = None,
     progress: Progress | None = None,
     cells: int | None = None,
-    drops: list[ObservedDrop] | None = None,
+    drops: list[ObservedDrop | ObservedImpact] | None = None,
     scans: Sequence[ObservedScan] = (),
     undisturbed: Sequence[UndisturbedDust] = (),
     model: Model | None = None,
@@ -55,13 +57,14 @@ def open_workbench(
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
     observations: list[Observation] = []
-    models, features = [], []
+    models: list[DropModel | AccelerationModel] = []
+    features: list[RunFeatures] = []
     for projectile, group in group_alike((drop.drop.projectile, drop) for drop in drops).items():
         nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
         table = ResponseTable(np.log(nodes), few)
         features.append(RunFeatures(len(families), table, encode_run))
         families.append(Family(projectile, nodes, False, few))
-        models += [make_drop_model(drop, table) for drop in group]
+        models += [_make_model(drop, table) for drop in group]
     observations.append(Tracks(tuple(models), tuple(features)))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
@@ -118,6 +121,12 @@ def extend(bench: Workbench, model: Model) -> None:
 
     bench.model = model
     bench.grid.extension = apply
+
+
+def _make_model(drop: ObservedDrop | ObservedImpact, table: ResponseTable) -> DropModel | AccelerationModel:
+    if isinstance(drop, ObservedImpact):
+        return make_acceleration_model(drop, table)
+    return make_drop_model(drop, table)
 
 
 def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float, ...], tuple[int, ...]]:

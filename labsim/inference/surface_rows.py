@@ -15,6 +15,7 @@ from ..own_keys import ROUND
 from ..records import STANDARD_GRAVITY, DecelerationCurve, Drop, Track
 from ..video.contact_row import find_surface_row
 from .observe import ObservedDrop
+from .observe_acceleration import ObservedImpact
 
 DOUBTED = 4.0  # standard deviations
 SCALE_SHARE = 0.01  # by which apparent gravity may be off before the pixel size is taken from it
@@ -54,7 +55,11 @@ def doubt_surface_row(drop: Drop, track: Track, curve: DecelerationCurve) -> str
     )
 
 
-def doubt_surface_rows(drops: Sequence[ObservedDrop]) -> list[str]:
+def doubt_surface_rows(drops: Sequence[ObservedDrop | ObservedImpact]) -> list[str]:
     """The same for every drop."""
-    doubts = {seen.name: doubt_surface_row(seen.drop, seen.track, seen.curve) for seen in drops}
+    doubts = {
+        seen.name: doubt_surface_row(seen.drop, seen.track, seen.curve)
+        for seen in drops
+        if isinstance(seen, ObservedDrop)
+    }
     return [f"drop {name}: {doubt}" for name, doubt in doubts.items() if doubt is not None]

@@ -27,6 +27,7 @@ from .observations.drop_terms import Terms
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
 from .observe import ObservedDrop
+from .observe_acceleration import ObservedImpact
 
 
 @dataclass
@@ -34,7 +35,7 @@ class Workbench:
     """A measured campaign with its runs: everything a fit needs."""
 
     campaign: Campaign
-    drops: list[ObservedDrop]
+    drops: list[ObservedDrop | ObservedImpact]
     grid: RunGrid
     families: list[Family]
     places: dict[str, Place]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..acceleration import find_impact, read_acceleration
 from ..errors import LabsimError
 from ..inference.observe import read_observed_track
 from ..inference.surface_rows import doubt_surface_row
@@ -27,6 +28,8 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
         return Found(drop.name, f"{size}: published figures")
     if drop.record.kind == "video":
         return _inspect_video(drop, size)
+    if drop.accelerometer is not None:
+        return _inspect_acceleration(drop, size)
     assert drop.camera is not None and drop.record.path is not None
     try:
         track = read_observed_track(drop)
@@ -48,6 +51,36 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
         found.odd.append(
             f"the container is only {campaign.sample.diameter / 2 / projectile.tip_radius:.2g} tips wide: walls are felt"
         )
+    return found
+
+
+def _inspect_acceleration(drop: Drop, size: str) -> Found:
+    """What the record says by itself: contact, speed, and the depth that it integrates to."""
+    assert drop.record.path is not None and drop.accelerometer is not None
+    try:
+        record = read_acceleration(drop.record.path, drop.accelerometer)
+        impact = find_impact(record, drop)
+    except LabsimError as trouble:
+        return Found(drop.name, f"{size}: no impact can be read", trouble=trouble)
+    peak = float(record.felt.max())
+    depth, stopped = impact.penetration_depth, math.isfinite(impact.stopping_time)
+    found = Found(
+        drop.name,
+        f"{size}: {record.time.size} samples, {impact.impact_speed.value:.3f} m/s at contact ({impact.speed_source}), at most "
+        f"{peak / STANDARD_GRAVITY:.3g} g, {depth.value * 1e3:.3f} ± {depth.sigma * 1e3:.3f} mm deep "
+        + (f"after {impact.stopping_time * 1e3:.2f} ms" if stopped else "where it ends"),
+        {
+            "samples": int(record.time.size),
+            "samples_saturated": record.saturated,
+            "samples_missing": record.lost,
+            "impact_speed_m_s": impact.impact_speed.value,
+            "largest_acceleration_m_s2": peak,
+            "penetration_depth_m": depth.value if stopped else None,
+            "penetration_depth_sigma_m": depth.sigma if stopped else None,
+            "stopping_time_s": impact.stopping_time if stopped else None,
+        },
+    )
+    found.odd += impact.warnings
     return found
 
 

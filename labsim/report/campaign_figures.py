@@ -43,22 +43,23 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
             cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
             above, below = np.ravel(np.asarray(cell.subplots()))
             clock = view.clock * 1e3
-            above.plot(clock, view.measured * 1e3, ".", color=INK, ms=4, label="measured")
+            above.plot(clock, view.measured * view.shown.factor, ".", color=INK, ms=4, label="measured")
             below.axhline(0.0, color=INK, lw=0.6)
-            band = 2e6 * view.allowed
+            band = 2 * view.shown.left_factor * view.allowed
             below.fill_between(clock, -band, band, color=GREY, alpha=0.25, lw=0)
             for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
-                above.plot(clock, depth * 1e3, "-", color=color, lw=1.2, label=name)
-                below.plot(clock, view.left(name) * 1e6, ".-", color=color, lw=0.9, ms=3)
+                above.plot(clock, depth * view.shown.factor, "-", color=color, lw=1.2, label=name)
+                below.plot(clock, view.left(name) * view.shown.left_factor, ".-", color=color, lw=0.9, ms=3)
             above.set_title(
                 f"{view.name}  {2e3 * view.projectile.tip_radius:.3g} mm, {view.speed:.2f} m/s", fontsize=8
             )
-            above.invert_yaxis()
+            if view.shown.downwards:
+                above.invert_yaxis()
             above.tick_params(labelbottom=False, labelsize=7)
             below.tick_params(labelsize=7)
-            if k % columns == 0:
-                above.set_ylabel("depth (mm)", fontsize=8)
-                below.set_ylabel("measured − fit (µm)", fontsize=8)
+            if k % columns == 0 or view.shown is not views[k - 1].shown:
+                above.set_ylabel(view.shown.label, fontsize=8)
+                below.set_ylabel(view.shown.left_label, fontsize=8)
             below.set_xlabel("time since contact (ms)", fontsize=8)
             if k == 0:
                 above.legend(fontsize=7)
@@ -91,8 +92,8 @@ def draw_misfit(views: Sequence[DropView], path: Path) -> Path:
         ax = figure.subplots()
         ax.axhline(0.0, color=INK, lw=0.8)
         for view, marker in zip(views, projectile_markers(views), strict=True):
-            for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
-                deepest = float(np.mean(depth[-3:]))
+            for name, color in zip(view.simulated, COLOURS, strict=False):
+                deepest = view.at_stop(name)
                 left = 100 * (view.at_stop() - view.at_stop(name)) / deepest
                 bar = 200 * view.allowed_at_stop / deepest
                 ax.errorbar(view.speed, left, bar, fmt=marker, color=color, ms=5, capsize=2, lw=0.8)

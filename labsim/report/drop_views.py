@@ -10,17 +10,41 @@ import numpy as np
 
 from ..inference.fitting import Fit
 from ..inference.forward import Instant, predict_depth
+from ..inference.observations.acceleration_model import AccelerationModel
 from ..inference.observations.drop_model import DropModel
 from ..inference.workbench import Workbench
-from ..records import FloatArray, Projectile
+from ..records import STANDARD_GRAVITY, FloatArray, Projectile
 
 BEFORE = 0.3  # share of the record after contact that is shown before it
 STOP_FRAMES = 3  # the last frames whose mean stands for the depth at the stop
 
 
 @dataclass(frozen=True)
+class Shown:
+    """Words and factors of what is drawn against time: the quantity, and what is left of it."""
+
+    label: str
+    factor: float
+    left_label: str
+    left_factor: float
+    unit: str
+    left_unit: str
+    downwards: bool
+
+
+DEPTH = Shown("depth (mm)", 1e3, "measured − fit (µm)", 1e6, "mm", "µm", True)
+FELT = Shown(
+    "acceleration (g)", 1 / STANDARD_GRAVITY, "measured − fit (g)", 1 / STANDARD_GRAVITY, "g", "g", False
+)
+
+
+@dataclass(frozen=True)
 class DropView:
-    """One drop; arrays of shape (n,), one entry a frame that is shown.
+    """One drop; arrays of shape (n,), one entry a frame that is shown (or a stretch of an accelerometer's record, for which m
+    reads m/s², felt upwards).
+
+    ends : of an accelerometer, depth (m) at the stop of each fit, and measured under "", as it integrates; allowed_end : m;
+    lengths : (n, n) that turns what is left into m.
 
     clock : s since contact of the first fit; measured : m below the undisturbed surface; simulated : name of the fit ->
     depth (m) at the same frames; allowed : m, standard deviation of what a true model leaves of a frame, noise included;
@@ -35,25 +59,37 @@ class DropView:
     simulated: dict[str, FloatArray]
     allowed: FloatArray
     noise: float
+    ends: dict[str, float] | None = None
+    allowed_end: float = 0.0
+    lengths: FloatArray | None = None
+
+    @property
+    def shown(self) -> Shown:
+        """How the quantity is drawn."""
+        return DEPTH if self.ends is None else FELT
 
     def left(self, fit: str) -> FloatArray:
         """Measured minus simulated, m."""
         return self.measured - self.simulated[fit]
 
     def rms(self, fit: str) -> float:
-        """Of what is left below the surface, m."""
+        """Of what is left below the surface, m; of an accelerometer as it integrates."""
+        if self.lengths is not None:
+            return float(np.sqrt(np.mean((self.lengths @ self.left(fit))[self.clock >= 0] ** 2)))
         below = self.clock >= 0
         left = self.left(fit)[below] if below.any() else self.left(fit)
         return float(np.sqrt(np.mean(left**2)))
 
     def at_stop(self, fit: str | None = None) -> float:
         """Depth (m) where the record ends: measured, or of a fit."""
+        if self.ends is not None:
+            return self.ends[fit or ""]
         values = self.measured if fit is None else self.simulated[fit]
         return float(np.mean(values[-STOP_FRAMES:]))
 
     @property
     def allowed_at_stop(self) -> float:
-        return float(np.mean(self.allowed[-STOP_FRAMES:]))
+        return float(np.mean(self.allowed[-STOP_FRAMES:])) if self.ends is None else self.allowed_end
 
     def stands_out(self, fit: str) -> bool:
         """Whether more frames lie outside two standard deviations than a true model would leave (one in ten)."""
@@ -70,6 +106,11 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
     for k, (model, instant) in enumerate(
         zip(tracks.models, tracks.instants(first.nuisances[0]), strict=True)
     ):
+        if isinstance(model, AccelerationModel):
+            views.append(
+                _view_acceleration(bench, fits, model, instant, [seen_by[name][k] for name, _ in fits])
+            )
+            continue
         observed = model.observed
         clock = observed.time - instant.contact_time
         seen = clock > -BEFORE * max(clock.max(), 1e-9)
@@ -91,6 +132,46 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
     return views
 
 
+def _view_acceleration(
+    bench: Workbench,
+    fits: Sequence[tuple[str, Fit]],
+    model: AccelerationModel,
+    instant: Instant,
+    instants: Sequence[Instant],
+) -> DropView:
+    """One accelerometer's record; the zero and the scale of its sensors are within what is allowed."""
+    observed, first = model.observed, fits[0][1]
+    clock = observed.time - instant.contact_time
+    seen = clock > -BEFORE * clock.max()
+    simulated, ends = {}, {"": model.deepest}
+    for (name, fit), own in zip(fits, instants, strict=True):
+        log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[observed.name]
+        code = model.table.code(log_p_m, own.log_speed, fit.values)
+        simulated[name] = model.predict(code, bench.instruments(fit.values)[observed.name], own)
+        ends[name] = math.exp(float(code[0]))
+    last = model.lengths[-1]
+    # measured depth at the stop: that of the first fit and what the record integrates to beyond it
+    ends[""] = ends[fits[0][0]] + float(last @ (model.data - simulated[fits[0][0]]))
+    place = list(first.drops.sections).index(observed.name)
+    start, points = first.drops.sections[observed.name].start, model.data.size
+    own_errors = first.drops.covariance[start : start + points, start : start + points].copy()
+    free = first.drops.local[place][:points, :2]
+    own_errors -= free @ free.T
+    return DropView(
+        observed.name,
+        observed.drop.projectile,
+        math.exp(instant.log_speed),
+        clock[seen],
+        model.data[seen],
+        {name: values[seen] for name, values in simulated.items()},
+        np.sqrt(np.maximum(np.diag(own_errors), 0.0))[seen],
+        float(np.median(observed.noise[seen])),
+        ends,
+        math.sqrt(max(float(last @ own_errors @ last), 0.0)),
+        model.lengths[np.ix_(seen, seen)],
+    )
+
+
 def predict_drop(
     bench: Workbench, fit: Fit, model: DropModel, instant: Instant, contact: float
 ) -> FloatArray:
@@ -110,6 +191,8 @@ def contact_offset(bench: Workbench, fit: Fit) -> float:
     drops, size = fit.drops, bench.terms.contact_offset
     column = np.zeros(drops.residual.size)
     for model in bench.tracks.models:
+        if isinstance(model, AccelerationModel):
+            continue
         section = drops.sections[model.observed.name]
         column[section.start : section.start + model.matrix.shape[0]] = size * model.radius
     return size * float(column @ drops.solve(drops.residual))

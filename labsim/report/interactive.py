@@ -28,29 +28,30 @@ def plot_drop(view: DropView) -> Spec:
     """Depth against time above, what is left below with the band of two standard deviations of a true model."""
     clock = view.clock * 1e3
     around = np.concatenate([clock, clock[::-1]])
-    band = 2e6 * view.allowed
-    noise = np.full_like(clock, view.noise * 1e6)
+    shown = view.shown
+    band = 2 * shown.left_factor * view.allowed
+    noise = np.full_like(clock, view.noise * shown.left_factor)
     data: list[Spec] = [
         _area(around, np.concatenate([band, -band[::-1]]), "band"),
         _area(around, np.concatenate([noise, -noise]), "noise"),
         {
-            "type": "scatter", "mode": "markers", "x": clock, "y": view.measured * 1e3, "meta": "measured",
-            "name": "measured", "marker": {"size": 5}, "hovertemplate": "%{y:.4f} mm",
+            "type": "scatter", "mode": "markers", "x": clock, "y": view.measured * shown.factor, "meta": "measured",
+            "name": "measured", "marker": {"size": 5}, "hovertemplate": f"%{{y:.4f}} {shown.unit}",
         },
     ]  # fmt: skip
     for role, (name, depth) in zip(ROLES, view.simulated.items(), strict=False):
         label = html.escape(name)
         data.append(
             {
-                "type": "scatter", "mode": "lines", "x": clock, "y": depth * 1e3, "meta": role, "name": label,
-                "line": {"width": 1.8}, "hovertemplate": "%{y:.4f} mm",
+                "type": "scatter", "mode": "lines", "x": clock, "y": depth * shown.factor, "meta": role, "name": label,
+                "line": {"width": 1.8}, "hovertemplate": f"%{{y:.4f}} {shown.unit}",
             }
         )  # fmt: skip
         data.append(
             {
-                "type": "scatter", "mode": "lines+markers", "x": clock, "y": view.left(name) * 1e6, "meta": role,
+                "type": "scatter", "mode": "lines+markers", "x": clock, "y": view.left(name) * shown.left_factor, "meta": role,
                 "name": f"left by {label}", "yaxis": "y2", "line": {"width": 1.1}, "marker": {"size": 3.5},
-                "hovertemplate": "%{y:+.2f} µm",
+                "hovertemplate": f"%{{y:+.2f}} {shown.left_unit}",
             }
         )  # fmt: skip
     layout = {
@@ -59,8 +60,11 @@ def plot_drop(view: DropView) -> Spec:
         "showlegend": False,
         "hovermode": "x unified",
         "xaxis": {"title": {"text": "time since contact (ms)"}, "anchor": "y2", "zeroline": False, "hoverformat": ".3f"},
-        "yaxis": {"title": {"text": "depth (mm)"}, "domain": [0.42, 1.0], "autorange": "reversed", "zeroline": True},
-        "yaxis2": {"title": {"text": "measured − fit (µm)"}, "domain": [0.0, 0.34], "zeroline": True},
+        "yaxis": {
+            "title": {"text": shown.label}, "domain": [0.42, 1.0], "zeroline": True,
+            "autorange": "reversed" if shown.downwards else True,
+        },
+        "yaxis2": {"title": {"text": shown.left_label}, "domain": [0.0, 0.34], "zeroline": True},
     }  # fmt: skip
     return {"data": data, "layout": layout}
 

@@ -25,7 +25,7 @@ expect = {"penetration_depth": 0, "stopping_time": 1}
 
 
 def applies(campaign):
-    tracked = any(drop.record.kind != "summary" for drop in campaign.drops)
+    tracked = any(drop.camera is not None for drop in campaign.drops)
     return "" if tracked else "there are published figures only, and no video or track"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ BIN = 8  # frames of free fall averaged into one point
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
 SPEED_WIDTH = 0.05  # of ln speed, prior width
 LEAST_SURFACE = 1e-9  # m
+WIDTHS = (FREE, SPEED_WIDTH)
 
 
 @dataclass(frozen=True)
@@ -55,19 +57,89 @@ class DropModel:
             code, self.observed.time, instant, instrument.pixel_factor, instrument.rate_factor
         )
 
-    def move(self, before: Instant, best: FloatArray) -> tuple[Instant, float]:
+    @property
+    def data(self) -> FloatArray:
+        """What is compared, m."""
+        return self.matrix @ self.observed.depth
+
+    @property
+    def data_variance(self) -> FloatArray:
+        return np.asarray(self.observed.sigma**2 * np.sum(self.matrix**2, axis=1))
+
+    @property
+    def below(self) -> np.ndarray:
+        """Which of the data were taken in the dust."""
+        return self.data > 3 * self.observed.sigma
+
+    @property
+    def size(self) -> FloatArray:
+        """What a law that is off by a share changes by that share, m."""
+        return np.maximum(self.data, 0.0)
+
+    @property
+    def way(self) -> FloatArray:
+        """Share of the way at each of the data."""
+        return self.size / self.size.max()
+
+    @property
+    def deepest(self) -> float:
+        """m"""
+        return float(np.max(self.observed.depth))
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(n, n) that turns errors of the data into m."""
+        return np.eye(self.matrix.shape[0])
+
+    def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+        """Derivative of ``predict`` by the contact time, m/s."""
+        return -self.predict_speed(code, instrument, instant)
+
+    @property
+    def zeros(self) -> FloatArray:
+        """(n, 1): the surface row at its stated error."""
+        return np.full((self.matrix.shape[0], 1), self.surface_sigma)
+
+    def share(
+        self, differ: Callable[[str], FloatArray], here: FloatArray, sizes: tuple[float, float, float]
+    ) -> dict[str, FloatArray]:
+        """Errors with one value for several drops; sizes : of pixel size, frame rate and the offset of the contact."""
+        camera = f"{self.observed.pixel:.6g} {self.camera.frame_rate:.6g}"
+        pixel, rate, contact = sizes
+        return {
+            f"pixel {camera}": differ("pixel_factor") * pixel,
+            f"frame {camera}": differ("rate_factor") * rate,
+            "contact offset": np.full(here.size, contact * self.radius),
+        }
+
+    def add_solver_noise(self, here: FloatArray, clock: FloatArray, stop: float) -> FloatArray:
+        """Variance (n,) of the solver that is independent in each datum; a depth has none."""
+        return np.zeros(here.size)
+
+    def in_dust(
+        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument
+    ) -> FloatArray:
+        """What the solver is off by a share of, m."""
+        return np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0)
+
+    def mean_time(self, instrument: Instrument) -> FloatArray:
+        """True times (s) of the data."""
+        return self.matrix @ (self.observed.time / instrument.rate_factor)
+
+    def move(self, before: Instant, best: FloatArray, widths: tuple[float, float]) -> tuple[Instant, float]:
         """Nuisances after the best step (contact time, ln speed, surface row; in prior widths), and how far that was.
 
         The largest move in prior widths; contact time in units of a frame, speed in per cent.
         """
+        free, speed_width = widths
         after = Instant(
-            before.contact_time + best[0] * FREE,
-            before.log_speed + best[1] * SPEED_WIDTH,
+            before.contact_time + best[0] * free,
+            before.log_speed + best[1] * speed_width,
             best[2] * self.surface_sigma,
         )
         return after, max(
-            abs(best[0] * FREE) * self.camera.frame_rate,
-            abs(best[1] * SPEED_WIDTH) * 100,
+            abs(best[0] * free) * self.camera.frame_rate,
+            abs(best[1] * speed_width) * 100,
             abs(after.surface - before.surface) / self.surface_sigma,
         )
 

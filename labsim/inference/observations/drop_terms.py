@@ -14,6 +14,7 @@ from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph import DropSetting
 from ..forward import Instant
+from .acceleration_model import AccelerationModel
 from .drop_model import FREE, SPEED_WIDTH, DropModel
 
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
@@ -67,6 +68,7 @@ class NumericalError:
     reach: float
     radius: float
     mass: float
+    unit: str = "m"
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def measure_distances(drops: Sequence[tuple[float, float, float]]) -> FloatArray
 
 
 def linearise_drop(
-    model: DropModel,
+    model: DropModel | AccelerationModel,
     instant: Instant,
     log_p_m: float,
     nominal: Probe,
@@ -102,13 +104,13 @@ def linearise_drop(
 ) -> DropTerms:
     """Residual, errors and tangents of one drop; instant : its nuisances; nominal : the point itself (its step means nothing)."""
     observed = model.observed
-    name, n = observed.name, model.matrix.shape[0]
+    name, n = observed.name, model.data.size
     instrument = nominal.instruments[name]
     lp = log_p_m + nominal.log_offsets.get(name, 0.0)
     response = model.table.at(lp, instant.log_speed)
     code = response.code(nominal.amplitudes)
     here = model.predict(code, instrument, instant)
-    speed = model.predict_speed(code, instrument, instant)
+    by_contact = model.by_contact(code, instrument, instant)
     faster = instant._replace(log_speed=instant.log_speed + 1e-3)
     fast_code = model.table.code(lp, faster.log_speed, nominal.amplitudes)
     by_speed = (model.predict(fast_code, instrument, faster) - here) / 1e-3
@@ -127,30 +129,33 @@ def linearise_drop(
 
     mass = observed.drop.projectile
     scatter = math.hypot(terms.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
-    widths = np.array([FREE, SPEED_WIDTH, model.surface_sigma, max(scatter, LEAST_SCATTER)])
-    local = np.stack([-speed, by_speed, np.ones(n), by_strength], axis=1) * widths
-    pull = np.array([0.0, 0.0, instant.surface / model.surface_sigma, 0.0])
+    zeros = model.zeros
+    columns = [
+        by_contact * FREE,
+        by_speed * SPEED_WIDTH,
+        zeros[:, 0],
+        by_strength * max(scatter, LEAST_SCATTER),
+    ]
+    local = np.column_stack([*columns, zeros[:, 1:]])
+    pull = np.zeros(local.shape[1])
+    pull[2] = instant.surface / model.surface_sigma
 
-    def differ(changed: Instrument) -> FloatArray:
+    def differ(factor: str) -> FloatArray:
+        changed = instrument.replace(**{factor: getattr(instrument, factor) * 1.001})
         return (model.predict(code, changed, instant) - here) / 1e-3
 
-    camera = f"{observed.pixel:.6g} {model.camera.frame_rate:.6g}"
     # two codes part slowly from shallow to deep drops: the one is too deep at one end, too shallow at the other. Depth counts in
     # tip radii, thus in spacings: with it, drops of all sizes, speeds and hidden effects lie on one curve, with speed they do not
     reach = float(code[0]) - math.log(model.radius)
-    larger = instrument.replace(pixel_factor=instrument.pixel_factor * 1.001)
-    quicker = instrument.replace(rate_factor=instrument.rate_factor * 1.001)
+    clock = model.mean_time(instrument) - instant.contact_time
+    final, stop = np.exp(code[0]), np.exp(code[1])
     shared = {
-        f"pixel {camera}": differ(larger) * terms.pixel_scale,
-        f"frame {camera}": differ(quicker) * terms.frame_scale,
-        "contact offset": np.full(n, terms.contact_offset * model.radius),
+        **model.share(differ, here, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
         "numerical slope": np.maximum(here, 0.0) * (reach - USUAL_DEPTH) * terms.numerical_slope,
         "numerical strength": by_strength * terms.numerical_strength,
     }
 
-    clock = model.matrix @ (observed.time / instrument.rate_factor - instant.contact_time)
-    final, stop = np.exp(code[0]), np.exp(code[1])
-    reached = np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0)
+    reached = model.in_dust(here, clock, final, instrument)
     plain = here if code is response.plain else model.predict(response.plain, instrument, instant)
     numerical = NumericalError(
         np.hypot(reached * terms.numerical, (here - plain) * terms.numerical_change),
@@ -158,10 +163,11 @@ def linearise_drop(
         reach,
         math.log(model.radius),
         math.log(mass.mass / model.radius**3),
+        "m" if model.camera is not None else "m/s^2",
     )
     drop = DropTerms(
-        model.matrix @ observed.depth - here,
-        observed.sigma**2 * np.sum(model.matrix**2, axis=1),
+        model.data - here,
+        model.data_variance + model.add_solver_noise(here, clock, stop),
         local,
         pull,
         tangents,
@@ -169,29 +175,40 @@ def linearise_drop(
         numerical,
     )
     if terms.heights:
-        drop = _add_height(drop, model, instant)
+        for expected, sigma in list_speeds(model):
+            drop = _add_speed(drop, expected - instant.log_speed, sigma)
     # nuisances are zero-mean about their priors, not about here
     return replace(drop, residual=drop.residual + drop.local @ pull)
 
 
-def _add_height(drop: DropTerms, model: DropModel, instant: Instant) -> DropTerms:
-    """The stated height is one more datum: ln v."""
-    height = model.observed.drop.height
-    if height is None or height.value <= 0:
-        return drop
-    expected = 0.5 * math.log(2 * STANDARD_GRAVITY * height.value)
-    sigma = math.hypot(0.5 * height.sigma / height.value, SPEED_SLACK)
-    # the logarithm of a height known to some ten percent is not normal; its mean is lower
-    expected -= 0.25 * (height.sigma / height.value) ** 2
+def list_speeds(model: DropModel | AccelerationModel) -> list[tuple[float, float]]:
+    """ln of the impact speed with its error, from each thing beside the motion in the dust that says it."""
+    drop, found = model.observed.drop, []
+    height = drop.height
+    if height is not None and height.value > 0:
+        # the logarithm of a height known to some ten percent is not normal; its mean is lower
+        expected = (
+            0.5 * math.log(2 * STANDARD_GRAVITY * height.value) - 0.25 * (height.sigma / height.value) ** 2
+        )
+        found.append((expected, math.hypot(0.5 * height.sigma / height.value, SPEED_SLACK)))
+    stated = (drop.impact_speed,) if isinstance(model, DropModel) else model.observed.speeds
+    for speed in stated:
+        if speed is not None:
+            found.append((math.log(speed.value), math.hypot(speed.sigma / speed.value, SPEED_SLACK)))
+    return found
+
+
+def _add_speed(drop: DropTerms, left: float, sigma: float) -> DropTerms:
+    """One more datum: ln v."""
 
     def pad(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         return {name: np.append(column, 0.0) for name, column in values.items()}
 
     numerical = drop.numerical
     return DropTerms(
-        np.append(drop.residual, expected - instant.log_speed),
+        np.append(drop.residual, left),
         np.append(drop.white, sigma**2),
-        np.vstack([drop.local, [0.0, SPEED_WIDTH, 0.0, 0.0]]),
+        np.vstack([drop.local, np.where(np.arange(drop.local.shape[1]) == 1, SPEED_WIDTH, 0.0)]),
         drop.pull,
         pad(drop.tangents),
         pad(drop.shared),

@@ -20,7 +20,8 @@ from ...records import FloatArray
 from ..blocks import Block
 from ..forward import Instant
 from . import RunFeatures
-from .drop_model import DropModel
+from .acceleration_model import AccelerationModel
+from .drop_model import WIDTHS, DropModel
 from .drop_terms import DropTerms, NumericalError, Probe, Terms, linearise_drop, measure_distances
 
 
@@ -38,7 +39,7 @@ class Tracks:
     Nuisances : (drops, 3) contact time (s), ln of the impact speed, offset of the surface row (m).
     """
 
-    models: tuple[DropModel, ...]
+    models: tuple[DropModel | AccelerationModel, ...]
     features: tuple[RunFeatures, ...]
     kind: str = "drops"
     name: str = "drops"
@@ -81,7 +82,7 @@ class Tracks:
         for model, instant, local in zip(self.models, self.instants(nuisances), block.local, strict=True):
             # in prior widths, about their middles
             best = local.T @ weighted[block.sections[model.observed.name]]
-            after, move = model.move(instant, best)
+            after, move = model.move(instant, best, WIDTHS)
             moved.append(after)
             moves.append(move)
         return np.array(moved), max(moves)
@@ -110,5 +111,8 @@ def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
     distance = np.subtract.outer(fraction, fraction) / 0.4
     distance *= distance
     apart = measure_distances([(part.reach, part.radius, part.mass) for part in parts])
+    # a depth and an acceleration are not off alike
+    unit = np.array([part.unit for part in parts])
+    apart += np.where(np.not_equal.outer(unit, unit), 1e4, 0.0)
     distance += np.repeat(np.repeat(apart, counts, axis=0), counts, axis=1)
     return np.asarray(np.outer(size, size) * np.exp(-0.5 * distance))

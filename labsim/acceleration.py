@@ -1,0 +1,398 @@
+"""An accelerometer's record as what the projectile feels: specific force against time, contact, stop, and the depth between.
+
+A sensor at rest feels gravity upwards, in free flight nothing, in the dust the force on the projectile over its mass. Input: a
+table with named columns, and what drop.toml says of its sensors. Output: SI, upwards positive. The depth is integrated for
+people and for a start; the likelihood compares the acceleration itself (inference/observations/acceleration_model.py).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import CampaignError, LabsimError, MeasurementError
+from .records import STANDARD_GRAVITY, Accelerometer, Drop, FloatArray, Measured, Sensor
+from .tables import Table
+from .tracks.lines import find_mark, read_lines, split_line
+
+UNITS = {"g": STANDARD_GRAVITY, "m/s^2": 1.0}
+FEWEST = 30  # samples
+NEAR_RANGE = 0.99  # of the range, from where a sensor is taken as saturated
+SHORT, LONG = 1e-7, 2e-3  # s, between which a sampling interval of an impact is believed
+SEEN = 5.0  # standard deviations: of a reading that is more than noise
+LOST = 1.5  # sampling intervals: a longer one is a gap
+FLIGHT = 5  # samples of rest and of flight that a release takes
+RELEASE = 10.0  # ln of the odds
+REST = 0.5  # of gravity: a level that is further off is no offset but another unit, sign or rest
+
+
+@dataclass(frozen=True)
+class Acceleration:
+    """One record. time (s), felt (m/s², upwards, gravity felt at rest), sigma (m/s²), sensor (its number) : (n,), of samples
+    that a sensor within its range gave. step : s, of the sampling; saturated, lost : samples that no sensor gave."""
+
+    time: FloatArray
+    felt: FloatArray
+    sigma: FloatArray
+    sensor: np.ndarray
+    step: float
+    saturated: int
+    lost: int
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What one record says of its drop without any simulation.
+
+    contact_time, released : s on the record's clock, released is NaN where no release is seen; flight, rest : m/s², felt in
+    free flight and after the stop (NaN where the record has none), should be 0 and gravity; flight_speed : m/s, from the time
+    between release and contact. time (s, from contact), speed (m/s), depth, depth_sigma (m) : (n,).
+    """
+
+    contact_time: float
+    released: float
+    flight: Measured
+    rest: Measured
+    flight_speed: Measured | None
+    impact_speed: Measured
+    speed_source: str
+    time: FloatArray
+    speed: FloatArray
+    depth: FloatArray
+    depth_sigma: FloatArray
+    stopping_time: float  # s, NaN where the record ends before
+    penetration_depth: Measured
+    warnings: tuple[str, ...]
+
+
+def read_accelerometer(table: Table) -> Accelerometer:
+    """The keys of ``[record]`` that say what the sensors are. Raises CampaignError."""
+    unit = UNITS[table.choice("unit", tuple(UNITS))]
+    at_rest = table.number("reads_at_rest", 0.0, 1.0)
+    if at_rest not in (0.0, 1.0):
+        raise table.wrong(
+            "reads_at_rest",
+            f"{at_rest:g} is neither; write 1.0 where a sensor at rest reads 1 g upwards, 0.0 where nothing",
+        )
+    columns = table.get("acceleration_column")
+    columns = columns if isinstance(columns, list) else [columns]
+    if not columns or not all(isinstance(name, str) and name.strip() for name in columns):
+        raise table.wrong(
+            "acceleration_column", f'{columns!r} is not a column\'s name or a list of names; write "a_g"'
+        )
+    if len(set(columns)) < len(columns):
+        raise table.wrong("acceleration_column", f"{columns!r} names a column twice; each is one sensor")
+    top = 1e6 / unit
+    sigma = _each(table, "sigma", 1e-9 / unit, top, len(columns))
+    offset = _each(table, "offset_sigma", 0.0, top, len(columns))
+    scale = _each(table, "scale_sigma", 0.0, 0.5, len(columns))
+    reach = _each(table, "range", 1e-3, top, len(columns), math.inf)
+    sensors = [
+        Sensor(name, s * unit, o * unit, c, r * unit)
+        for name, s, o, c, r in zip(columns, sigma, offset, scale, reach, strict=True)
+    ]
+    return Accelerometer(
+        table.text("time_column"),
+        tuple(sorted(sensors, key=lambda each: each.range)),
+        unit,
+        at_rest * STANDARD_GRAVITY,
+    )
+
+
+def _each(
+    table: Table, key: str, low: float, high: float, count: int, default: float | None = None
+) -> list[float]:
+    """One number a sensor; a single one holds for all."""
+    value = table.get(key) if default is None else table.get(key, default)
+    values = value if isinstance(value, list) else [value] * count
+    if len(values) != count:
+        raise table.wrong(key, f"has {len(values)} numbers for {count} columns; give one, or one a column")
+    for each in values:
+        if not (default is not None and each is default):
+            table.check_number(key, each, low, high)
+    return [float(each) for each in values]
+
+
+def check_acceleration(path: Path, accelerometer: Accelerometer) -> None:
+    """See that a record can be read and holds an impact, before anything is computed. Raises CampaignError."""
+    try:
+        find_contact(read_acceleration(path, accelerometer), accelerometer, path)
+    except MeasurementError as trouble:
+        raise CampaignError(trouble.where, trouble.key, trouble.message) from None
+
+
+def read_acceleration(path: Path, accelerometer: Accelerometer) -> Acceleration:
+    """The samples, each from the finest sensor that is within its range. Raises MeasurementError."""
+    names = [accelerometer.time_column, *(sensor.column for sensor in accelerometer.sensors)]
+    table = _read_columns(path, names)
+    time, readings = table[:, 0], table[:, 1:] * accelerometer.unit
+    steps = np.diff(time)
+    if not np.all(steps > 0):
+        at = int(np.argmin(steps > 0))
+        raise MeasurementError(
+            path,
+            accelerometer.time_column,
+            f"does not rise after {time[at]:g} s; keep one record, sorted by its time",
+        )
+    step = float(np.median(steps))
+    if not SHORT <= step <= LONG:
+        raise MeasurementError(
+            path,
+            accelerometer.time_column,
+            f"has a sample every {step:g} s, outside {SHORT:g} to {LONG:g}; the column is in seconds",
+        )
+    sensor = np.full(time.size, -1)
+    felt = np.full(time.size, math.nan)
+    for k, each in enumerate(accelerometer.sensors):
+        good = np.isfinite(readings[:, k]) & (np.abs(readings[:, k]) < NEAR_RANGE * each.range) & (sensor < 0)
+        sensor[good] = k
+        felt[good] = readings[good, k]
+    use = sensor >= 0
+    if use.sum() < FEWEST:
+        raise MeasurementError(
+            path, "range", f"leaves {int(use.sum())} samples of {use.size}; check unit and range"
+        )
+    beyond = ~use & np.any(np.isfinite(readings), axis=1)
+    sigma = np.array([each.sigma for each in accelerometer.sensors])
+    felt += STANDARD_GRAVITY - accelerometer.reads_at_rest
+    lost = int(np.sum(np.maximum(np.round(steps / step) - 1, 0))) + int(np.sum(~use & ~beyond))
+    return Acceleration(time[use], felt[use], sigma[sensor[use]], sensor[use], step, int(beyond.sum()), lost)
+
+
+def _read_columns(path: Path, names: list[str]) -> FloatArray:
+    """(rows, names); an empty cell is NaN, but not that of the time."""
+    try:
+        lines = read_lines(path)
+    except LabsimError as trouble:
+        raise MeasurementError(path, "record.file", trouble.message) from None
+    if not lines:
+        raise MeasurementError(path, "record.file", "is empty; export the table with its heading")
+    mark = find_mark(lines[0][1])
+    heading = split_line(lines[0][1], mark)
+    for name in names:
+        if heading.count(name) != 1:
+            raise MeasurementError(
+                path,
+                f"line {lines[0][0]}",
+                f"has {heading.count(name) or 'no'} column{'s' * (heading.count(name) > 1)} {name!r}; "
+                f"the columns are {', '.join(heading)[:200]}",
+            )
+    places = [heading.index(name) for name in names]
+    rows = np.full((len(lines) - 1, len(names)), math.nan)
+    for row, (number, text) in zip(rows, lines[1:], strict=True):
+        cells = split_line(text, mark)
+        for k, place in enumerate(places):
+            cell = cells[place] if place < len(cells) else ""
+            if cell == "" and k > 0:
+                continue
+            try:
+                row[k] = float(cell.replace(",", ".") if mark != "," else cell)
+            except ValueError:
+                raise MeasurementError(
+                    path, f"line {number}", f"{cell[:40]!r} is not a number; correct or remove the line"
+                ) from None
+        if not math.isfinite(row[0]) or np.isinf(row).any():
+            raise MeasurementError(
+                path, f"line {number}", "holds no finite number; correct or remove the line"
+            )
+    if len(rows) < FEWEST:
+        raise MeasurementError(
+            path, "record.file", f"has {len(rows)} samples; an impact takes {FEWEST} or more"
+        )
+    if float(np.nanmax(np.abs(rows[:, 1:]), initial=0.0)) > 1e9 or float(np.abs(rows[:, 0]).max()) > 1e9:
+        raise MeasurementError(path, "record.file", "holds numbers beyond 1e9; they are no seconds and no g")
+    return rows
+
+
+def find_contact(record: Acceleration, accelerometer: Accelerometer, path: Path) -> int:
+    """Number of the first sample of the impact: from there on, to the largest, the projectile feels more than noise.
+
+    Raises MeasurementError where there is no impact, or one of the wrong sign.
+    """
+    sensor = accelerometer.sensors[0]
+    felt, sigma = record.felt, record.sigma
+    peak = int(np.argmax(felt))
+    least = float(np.min(felt))
+    if -least > felt[peak]:
+        raise MeasurementError(
+            path,
+            sensor.column,
+            f"is largest downwards ({least / STANDARD_GRAVITY:.3g} g): an impact reads upwards; turn its sign",
+        )
+    floor = SEEN * sigma + max(each.offset_sigma for each in accelerometer.sensors)
+    if felt[peak] < 2 * STANDARD_GRAVITY or felt[peak] < 3 * floor[peak]:
+        raise MeasurementError(
+            path,
+            sensor.column,
+            f"never feels more than {felt[peak] / STANDARD_GRAVITY:.3g} g: no impact stands out; check unit and reads_at_rest",
+        )
+    # before an impact the projectile feels little for a while: the last quiet spell in front of the largest reading
+    quiet = felt[:peak] < np.maximum(floor[:peak], 0.02 * felt[peak])
+    spell = np.convolve(quiet, np.ones(3), "valid") == 3 if peak >= 3 else np.empty(0)
+    if not np.any(spell):
+        level = float(np.median(felt[: max(peak, 1)]))
+        raise MeasurementError(
+            path,
+            sensor.column,
+            f"shows no free flight before the impact (it feels {level / STANDARD_GRAVITY:.3g} g there instead of 0); let the "
+            "record begin earlier, or correct reads_at_rest and unit",
+        )
+    return int(np.nonzero(spell)[0][-1]) + 3
+
+
+def find_impact(record: Acceleration, drop: Drop) -> Impact:
+    """Contact, speed, depth and stop of one record, with what looks odd. Raises MeasurementError."""
+    accelerometer, path = drop.accelerometer, drop.record.path
+    assert accelerometer is not None and path is not None
+    first = find_contact(record, accelerometer, path)
+    time, felt = record.time, record.felt
+    offset = max(each.offset_sigma for each in accelerometer.sensors)
+    peak = int(np.argmax(felt))
+    floor = max(SEEN * float(record.sigma[first]) + offset, 0.02 * float(felt.max()))
+    contact = _refine(record, first, floor)
+    first = int(np.searchsorted(time, contact))
+    warnings = []
+    if record.saturated:
+        warnings.append(f"{record.saturated} samples lie beyond the range of every sensor and are left out")
+    if record.lost:
+        warnings.append(f"{record.lost} samples are missing")
+    released, release_sigma, flight = _find_release(record, first)
+    allowed = 4 * math.hypot(offset, flight.sigma)
+    if abs(flight.value) > REST * STANDARD_GRAVITY:
+        raise MeasurementError(
+            path,
+            "reads_at_rest",
+            f"is contradicted: free flight feels {flight.value / STANDARD_GRAVITY:.3g} g instead of 0; correct it, or unit",
+        )
+    if abs(flight.value) > max(allowed, 0.01 * STANDARD_GRAVITY):
+        warnings.append(
+            f"free flight feels {flight.value / STANDARD_GRAVITY:.3f} g instead of 0, more than offset_sigma says; check the zero"
+        )
+    flight_speed = None
+    if math.isfinite(released):
+        fallen = STANDARD_GRAVITY * (contact - released)
+        flight_speed = Measured(
+            fallen,
+            STANDARD_GRAVITY * math.hypot(release_sigma, 2 * record.step, 0.2 * (time[peak] - contact)),
+        )
+    # at the sensor's own zero, as free flight shows it, where that is known better than it is stated
+    zero = flight.value if flight.sigma < offset else 0.0
+    net = np.append(-STANDARD_GRAVITY, felt[first:] - zero - STANDARD_GRAVITY)
+    clock = np.append(0.0, time[first:] - contact)
+    given_up = np.concatenate([[0.0], np.cumsum(0.5 * (net[1:] + net[:-1]) * np.diff(clock))])
+    speed, source = _choose_speed(drop, flight_speed, given_up)
+    sensors = accelerometer.sensors
+    scale = max(each.scale_sigma for each in sensors)
+    zero_sigma = min(offset, flight.sigma)
+    velocity = speed.value - given_up
+    # errors leave a rest of speed at the stop: it is over where that is small and the force gone
+    doubt = np.sqrt(
+        speed.sigma**2 + (scale * given_up) ** 2 + (zero_sigma * clock) ** 2 + (0.02 * speed.value) ** 2
+    )
+    gone = np.append(felt[first:], felt[-1]) < 0.5 * np.maximum.accumulate(np.append(felt[first:], felt[-1]))
+    stopped = np.nonzero((velocity <= 0.0) | (gone & (velocity < 3 * doubt)))[0]
+    last = int(stopped[0]) if stopped.size else clock.size - 1
+    stop = float(clock[last]) if stopped.size else math.nan
+    depth = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(clock))])
+
+    def twice(rate: FloatArray) -> FloatArray:
+        return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(clock))])
+
+    fall = twice(given_up + STANDARD_GRAVITY * clock)
+    depth_sigma = np.sqrt(
+        (speed.sigma * clock) ** 2 + (0.5 * zero_sigma * clock**2) ** 2 + (scale * fall) ** 2
+        + (record.sigma[min(first, felt.size - 1)] ** 2 * record.step * np.maximum(clock, 0.0) ** 3 / 3)
+    )  # fmt: skip
+    rest = Measured(math.nan, math.nan)
+    if stopped.size:
+        after = felt[first:][clock[1:] > 2.0 * stop]
+        if after.size >= 10:
+            rest = Measured(float(np.median(after)), float(1.25 * np.std(after) / math.sqrt(after.size)))
+            off = rest.value - STANDARD_GRAVITY
+            if abs(off) > max(
+                4 * math.hypot(offset, scale * STANDARD_GRAVITY, rest.sigma), 0.02 * STANDARD_GRAVITY
+            ):
+                warnings.append(
+                    f"after the stop it feels {rest.value / STANDARD_GRAVITY:.3f} g instead of 1; check unit, offset_sigma and "
+                    "reads_at_rest"
+                )
+    else:
+        warnings.append(
+            "ends, by its own integral, before the projectile stops; the depth is that at its end"
+        )
+    short = abs(speed.value - float(given_up[last])) if not stopped.size else 0.0
+    if short > 0.3 * speed.value:
+        warnings.append(
+            f"takes up only {given_up[last]:.3g} of {speed.value:.3g} m/s ({source}); check unit, scale and whether it is whole"
+        )
+    for text, stated in (("height_mm", _fall_speed(drop)), ("impact_speed_m_s", drop.impact_speed)):
+        if stated is None or flight_speed is None:
+            continue
+        if abs(stated.value - flight_speed.value) > max(
+            4 * math.hypot(stated.sigma, flight_speed.sigma), 0.02 * stated.value
+        ):
+            warnings.append(
+                f"the flight lasts {(contact - released) * 1e3:.4g} ms, thus {flight_speed.value:.3f} m/s at contact, but "
+                f"{text} says {stated.value:.3f} ± {stated.sigma:.3f} m/s"
+            )
+    return Impact(
+        contact, released, flight, rest, flight_speed, speed, source,
+        clock[: last + 1], velocity[: last + 1], depth[: last + 1], depth_sigma[: last + 1],
+        stop, Measured(float(depth[last]), float(depth_sigma[last])), tuple(warnings),
+    )  # fmt: skip
+
+
+def _refine(record: Acceleration, first: int, floor: float) -> float:
+    """Contact (s): the rise from the first sample above the noise to twice that, drawn back to nothing."""
+    later = record.felt[first:] > 2 * floor
+    at = first + int(np.argmax(later)) if later.any() else first
+    begin = float(record.time[first] - 0.5 * record.step)
+    return max(begin - float(record.time[at] - record.time[first]), float(record.time[0]))
+
+
+def _find_release(record: Acceleration, first: int) -> tuple[float, float, Measured]:
+    """When the projectile was let go (s; NaN where the record begins in flight), with its error, and what is felt from there on.
+
+    The most likely step from gravity to nothing in white noise; one that is not e^RELEASE times likelier than none is no release.
+    """
+    felt, time, step = record.felt[: max(first - 1, 0)], record.time, record.step
+    if felt.size < 2 * FLIGHT:
+        level = float(np.mean(felt)) if felt.size else 0.0
+        return math.nan, math.nan, Measured(level, float(record.sigma[0]) / math.sqrt(max(felt.size, 1)))
+    sigma = max(float(np.mean(record.sigma[: felt.size])), 1e-3 * STANDARD_GRAVITY)
+    gain = np.cumsum(felt - 0.5 * STANDARD_GRAVITY) * STANDARD_GRAVITY / sigma**2
+    at = int(np.argmax(gain[:-FLIGHT]))
+    held = gain[at] > RELEASE and at >= FLIGHT
+    free = felt[at + 1 :] if held else felt
+    flight = Measured(float(np.mean(free)), max(float(np.std(free)), sigma) / math.sqrt(free.size))
+    if not held:
+        return math.nan, math.nan, flight
+    return float(time[at] + 0.5 * step), step * max(1.0, 2 * (sigma / STANDARD_GRAVITY) ** 2), flight
+
+
+def _fall_speed(drop: Drop) -> Measured | None:
+    """What the stated height gives, m/s."""
+    if drop.height is None or drop.height.value <= 0:
+        return None
+    speed = math.sqrt(2 * STANDARD_GRAVITY * drop.height.value)
+    return Measured(speed, 0.5 * speed * drop.height.sigma / drop.height.value)
+
+
+def _choose_speed(drop: Drop, flight: Measured | None, given_up: FloatArray) -> tuple[Measured, str]:
+    """The best known impact speed; where nothing gives one, what the impact takes up at most."""
+    known = [
+        (speed, source)
+        for speed, source in (
+            (drop.impact_speed, "stated"),
+            (flight, "from the flight"),
+            (_fall_speed(drop), "from the height"),
+        )
+        if speed is not None
+    ]
+    if known:
+        return min(known, key=lambda each: each[0].sigma)
+    most = float(np.max(given_up))
+    return Measured(max(most, 1e-3), 0.05 * max(most, 1e-3)), "taken up by the impact"

@@ -1,0 +1,151 @@
+"""One drop as an accelerometer on the projectile records it, compared as acceleration against time.
+
+A sample is the mean over its interval, and the mean acceleration of a stretch of time is the change of speed in it: what a run
+is expected to show follows from the speeds at the ends of each stretch, without a second derivative of a table. Stretches are
+1/BINS of the stopping time, or single samples where these are longer, and the free flight is one, which shows the zero.
+
+Errors: noise; zero of each sensor (stated, one a drop); scale of each sensor (stated, one for all drops); contact time and
+speed (free); noise of the particles' force. docs/acceleration.md has the figures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...effects import Instrument
+from ...records import STANDARD_GRAVITY, FloatArray
+from ..forward import Instant, ResponseTable, predict_speed
+from ..observe_acceleration import BINS, ObservedImpact
+
+# of the largest deceleration, of a mean over 1/BINS of the stop: force noise of particles and of the table, neighbours half
+# alike, measured by benchmarks/acceleration_error.py; and what the table smooths of the first blow, which fades over so much of
+# the stop
+FORCE_NOISE = 0.02
+BLOW, BLOW_LENGTH = 0.10, 0.03
+
+
+@dataclass(frozen=True)
+class AccelerationModel:
+    """One record with its response table. start : its nuisances by the record alone; its zero is among the errors, not there."""
+
+    observed: ObservedImpact
+    table: ResponseTable
+    start: Instant
+    camera: None = None
+
+    @property
+    def radius(self) -> float:
+        return self.observed.drop.projectile.tip_radius
+
+    @property
+    def data(self) -> FloatArray:
+        """What is compared, m/s²."""
+        return self.observed.felt
+
+    @property
+    def data_variance(self) -> FloatArray:
+        return self.observed.noise**2
+
+    @property
+    def below(self) -> np.ndarray:
+        """Which of the data were taken in the dust."""
+        return self.observed.begin > self.observed.contact_time
+
+    @property
+    def size(self) -> FloatArray:
+        """What a law that is off by a share changes by that share, m/s²."""
+        return np.where(self.below, np.maximum(self.data, 0.0), 0.0)
+
+    @property
+    def way(self) -> FloatArray:
+        """Share of the way at each of the data, by the record's own integral."""
+        impact = self.observed.impact
+        clock = self.observed.time - impact.contact_time
+        return np.interp(clock, impact.time, np.maximum(impact.depth, 0.0) / max(self.deepest, 1e-9))
+
+    @property
+    def deepest(self) -> float:
+        """m"""
+        return self.observed.impact.penetration_depth.value
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(n, n) that turns errors of the data into m: the depth that they integrate to at the end of each stretch."""
+        begin, end = self.observed.begin, self.observed.end
+        width, middle = end - begin, 0.5 * (begin + end)
+        apart = np.tril(end[:, None] - middle[None, :])
+        return np.asarray(-apart * width[None, :] * self.below[None, :])
+
+    def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+        """Mean specific force (m/s²) over each stretch, (n,), of an encoded curve."""
+        begin, end = self.observed.begin, self.observed.end
+        plain = Instrument()  # scale and clock of a camera are none of an accelerometer
+        before, after = (
+            predict_speed(code, t, instant, plain.pixel_factor, plain.rate_factor) for t in (begin, end)
+        )
+        return STANDARD_GRAVITY - (after - before) / (end - begin)
+
+    def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+        """Derivative of ``predict`` by the contact time, m/s³, over a tenth of a stretch."""
+        step = 0.1 * float(np.median(self.observed.end - self.observed.begin))
+        late = instant._replace(contact_time=instant.contact_time + step)
+        early = instant._replace(contact_time=instant.contact_time - step)
+        return (self.predict(code, instrument, late) - self.predict(code, instrument, early)) / (2 * step)
+
+    @property
+    def surface_sigma(self) -> float:
+        return 1.0
+
+    @property
+    def zeros(self) -> FloatArray:
+        """(n, 1 + sensors): nothing in the place of a camera's surface row, then the zero of each sensor at its stated error."""
+        accelerometer = self.observed.drop.accelerometer
+        assert accelerometer is not None
+        sigma = np.array([each.offset_sigma for each in accelerometer.sensors])
+        return np.column_stack([np.zeros(self.data.size), self.observed.sensors * sigma])
+
+    def share(
+        self, differ: Callable[[str], FloatArray], here: FloatArray, sizes: tuple[float, float, float]
+    ) -> dict[str, FloatArray]:
+        """Errors with one value for all drops: the scale of each sensor. It acts on what the sensor puts out."""
+        accelerometer = self.observed.drop.accelerometer
+        assert accelerometer is not None
+        output = here - STANDARD_GRAVITY + accelerometer.reads_at_rest
+        return {
+            f"scale {each.column} {each.range:g}": output * self.observed.sensors[:, k] * each.scale_sigma
+            for k, each in enumerate(accelerometer.sensors)
+        }
+
+    def add_solver_noise(self, here: FloatArray, clock: FloatArray, stop: float) -> FloatArray:
+        """Variance (n,) of the solver's force, independent in each stretch."""
+        width = self.observed.end - self.observed.begin
+        shares = FORCE_NOISE * np.sqrt(stop / BINS / np.minimum(width, stop))
+        late = np.clip(clock / stop, 0.0, 1.0)
+        sigma = np.hypot(shares, BLOW * np.exp(-late / BLOW_LENGTH)) * float(np.max(np.abs(here)))
+        return np.where(self.observed.end > self.observed.contact_time - 0.5 * stop / BINS, sigma**2, 0.0)
+
+    def in_dust(
+        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument
+    ) -> FloatArray:
+        """What the solver is off by a share of, m/s²."""
+        return np.where(clock > 0, np.maximum(here, 0.0), 0.0)
+
+    def mean_time(self, instrument: Instrument) -> FloatArray:
+        return self.observed.time
+
+    def move(self, before: Instant, best: FloatArray, widths: tuple[float, float]) -> tuple[Instant, float]:
+        """Nuisances after the best step (contact time, ln speed), and how far that was: in stretches, in per cent."""
+        free, speed_width = widths
+        after = Instant(before.contact_time + best[0] * free, before.log_speed + best[1] * speed_width, 0.0)
+        stretch = float(np.median(self.observed.end - self.observed.begin))
+        return after, max(abs(best[0] * free) / stretch, abs(best[1] * speed_width) * 100)
+
+
+def make_acceleration_model(observed: ObservedImpact, table: ResponseTable) -> AccelerationModel:
+    return AccelerationModel(
+        observed, table, Instant(observed.contact_time, math.log(observed.impact_speed), 0.0)
+    )

@@ -1,0 +1,165 @@
+"""Records of accelerometers: read, integrated and refused, against motions in closed form."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import accelerations
+import numpy as np
+import pytest
+from laws import move
+from mutations import change_bytes, change_text
+
+from labsim.acceleration import find_impact, read_acceleration
+from labsim.campaign import read_campaign
+from labsim.errors import CampaignError, LabsimError
+from labsim.inspection.drops import inspect_drop
+from labsim.records import Campaign
+
+SHAPE = (1.0, 12.0, 0.7)  # mm, mg, m/s
+
+
+def make(folder: Path, **values: float) -> Path:
+    return accelerations.write_campaign(folder / "c", drops=[SHAPE], **values)
+
+
+def edit(folder: Path, old: str, new: str) -> None:
+    file = folder / "drops" / "D01" / "drop.toml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def look(campaign: Campaign):  # type: ignore[no-untyped-def]
+    drop = campaign.drops[0]
+    return find_impact(read_acceleration(drop.record.path, drop.accelerometer), drop)
+
+
+def test_depth_speed_contact_and_stop_of_a_known_motion(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    depth, stop = move(SHAPE[0] * 1e-3, SHAPE[1] * 1e-6, SHAPE[2], 1300.0)
+    contact = accelerations.make_pulse(*SHAPE)[2]
+    impact = look(read_campaign(folder))
+    assert impact.contact_time == pytest.approx(contact, abs=0.1 * stop)
+    assert impact.flight_speed.value == pytest.approx(SHAPE[2], rel=0.02)
+    assert abs(impact.penetration_depth.value - depth) < 3 * impact.penetration_depth.sigma + 0.02 * depth
+    assert impact.stopping_time == pytest.approx(stop, rel=0.05)
+    assert impact.rest.value == pytest.approx(9.81, abs=4 * 0.05 * 9.81)
+    assert not impact.warnings
+
+
+def test_the_depth_has_the_error_that_scale_and_zero_leave(tmp_path: Path) -> None:
+    """Forty records with a scale and a zero of their own: the depths scatter as they say, within a factor of two."""
+    pulls = []
+    depth, _ = move(SHAPE[0] * 1e-3, SHAPE[1] * 1e-6, SHAPE[2], 1300.0)
+    rng = np.random.default_rng(5)
+    for k in range(40):
+        folder = make(tmp_path / str(k), seed=k, scale=1 + 0.03 * rng.standard_normal())
+        edit(folder, "scale_sigma = 0.01", "scale_sigma = 0.03")
+        found = look(read_campaign(folder)).penetration_depth
+        pulls.append((found.value - depth) / found.sigma)
+    assert 0.4 < np.std(pulls) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ('"g"', '"m/s^2"', ""),
+        ("reads_at_rest = 1.0", "reads_at_rest = 0.0", "reads_at_rest"),
+        ("reads_at_rest = 1.0", "reads_at_rest = 0.5", "record.reads_at_rest"),
+        ('"a_g"', '"b_g"', "line 1"),
+        ('"a_g"', '["a_g", "a_g"]', "record.acceleration_column"),
+        ('"time_s"', '"a_g"', ""),
+        ("offset_sigma = 0.05", "offset_sigma = [0.05, 0.1]", "record.offset_sigma"),
+        ("scale_sigma = 0.01", "scale_sigma = -0.01", "record.scale_sigma"),
+        ("[record]", "[camera]\nframe_rate_Hz = 1e4\n[record]", "[camera]"),
+    ],
+)
+def test_wrong_statements_are_refused_or_odd(tmp_path: Path, old: str, new: str, key: str) -> None:
+    folder = make(tmp_path)
+    edit(folder, old, new)
+    try:
+        campaign = read_campaign(folder)
+    except CampaignError as trouble:
+        assert key in trouble.key
+        return
+    found = inspect_drop(campaign.drops[0], campaign)
+    assert found.trouble is not None or found.odd
+
+
+def test_damaged_records_are_odd_or_refused(tmp_path: Path) -> None:
+    time, felt, contact = accelerations.make_pulse(*SHAPE)
+    _, stop = move(SHAPE[0] * 1e-3, SHAPE[1] * 1e-6, SHAPE[2], 1300.0)
+    inside = (time > contact + 0.3 * stop) & (time < contact + 0.4 * stop)
+    for name, t, a, word in (
+        ("sign", time, -felt, "turn its sign"),
+        ("gap", time[~inside], felt[~inside], "missing"),
+        ("cut", time[time < contact + 0.5 * stop], felt[time < contact + 0.5 * stop], "ends"),
+        ("offset", time, felt + 0.4, "free flight"),
+        ("late", time[time > contact + 0.2 * stop], felt[time > contact + 0.2 * stop], "no free flight"),
+        ("quiet", time, 1 + 0 * felt, "no impact"),
+        ("back", np.where(inside, time[::-1], time), felt, "does not rise"),
+        ("double", time, 2 * felt - 1.0 * (felt < 1.5) * felt, ""),
+    ):
+        folder = make(tmp_path / name)
+        accelerations.write_record(folder / "drops" / "D01", t, a)
+        try:
+            campaign = read_campaign(folder)
+        except CampaignError as trouble:
+            assert word in trouble.message, name
+            continue
+        found = inspect_drop(campaign.drops[0], campaign)
+        said = [*found.odd, str(found.trouble or "")]
+        assert (any(word in text for text in said) and any(said)) or name == "double", (name, said)
+
+
+def test_the_finest_sensor_within_its_range_is_taken(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    time, felt, _ = accelerations.make_pulse(*SHAPE)
+    top = 0.5 * felt.max()
+    accelerations.write_record(
+        folder / "drops" / "D01", time, felt + 0.2, np.minimum(felt, top), names="high,low"
+    )
+    edit(folder, '"a_g"', '["high", "low"]')
+    edit(folder, "offset_sigma = 0.05", f"offset_sigma = [0.2, 0.05]\nrange = [500.0, {top}]")
+    drop = read_campaign(folder).drops[0]
+    record = read_acceleration(drop.record.path, drop.accelerometer)
+    assert record.saturated == 0
+    fine = record.sensor == 0
+    assert drop.accelerometer.sensors[0].column == "low"
+    np.testing.assert_allclose(record.felt[fine] / 9.81, felt[fine], atol=1e-4)
+    np.testing.assert_allclose(record.felt[~fine] / 9.81, felt[~fine] + 0.2, atol=1e-4)
+    assert np.all(felt[~fine] >= 0.98 * top)
+
+
+def test_a_mutated_record_is_refused_or_read_never_a_traceback(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    record, toml = folder / "drops" / "D01" / "acceleration.csv", folder / "drops" / "D01" / "drop.toml"
+    sound, stated = record.read_bytes(), toml.read_text()
+    rng = random.Random(11)
+    words = ["nan", "inf", "-1", "1e308", '""', "x", "0", "[1, 2]", "true", "\x00", "1e-300", '"g"']
+    kinds = ["flip", "cut", "repeat", "drop", "insert", "zero"]
+    refused = 0
+    for k in range(300):
+        record.write_bytes(sound)
+        toml.write_text(stated)
+        if k % 2:
+            change = (
+                rng.choice(["value", "key", "without", "digit", "twice"]),
+                rng.random(),
+                rng.choice(words),
+            )
+            toml.write_text(change_text(stated, change), errors="replace")
+        else:
+            extra = bytes(rng.randrange(256) for _ in range(rng.randrange(1, 9)))
+            changes = [(rng.choice(kinds), rng.random(), extra) for _ in range(rng.randrange(1, 4))]
+            record.write_bytes(change_bytes(sound, changes))
+        try:
+            campaign = read_campaign(folder)
+            found = inspect_drop(campaign.drops[0], campaign)
+            if found.trouble is None and found.numbers.get("penetration_depth_m") is not None:
+                assert np.isfinite(found.numbers["penetration_depth_m"])
+        except LabsimError:
+            refused += 1
+    assert 30 < refused < 300
