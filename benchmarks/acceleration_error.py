@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from labsim.inference.curves import decode_rate, encode_run
+from labsim.inference.curves import decode_speed, encode_speeds
 from labsim.records import STANDARD_GRAVITY, Material, Projectile
 from labsim.sph import DropSetting, simulate
 
@@ -44,7 +44,7 @@ def main() -> None:
         ]
         edges = np.linspace(0.0, runs[-1].stopping_time, BINS + 1)
         own = [bin_force(lambda t, run=run: np.interp(t, run.time, run.velocity), edges) for run in runs]
-        kept = [bin_force(lambda t, run=run: decode_rate(encode_run(run), t), edges) for run in runs]
+        kept = [bin_force(lambda t, run=run: decode_speed(encode_speeds(run), t), edges) for run in runs]
         scaled = [
             bin_force(
                 lambda t, run=run: np.interp(t, run.time, run.velocity),

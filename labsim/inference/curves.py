@@ -25,6 +25,20 @@ def encode_run(run: DropRun | Motion) -> FloatArray:
     return np.concatenate([[np.log(run.penetration_depth), np.log(run.stopping_time)], shape])
 
 
+def encode_speeds(run: DropRun | Motion) -> FloatArray:
+    """(2 + len(FRACTIONS),): ln D, ln T_s and the speeds of one run in D/T_s, whose differences are accelerations: the second
+    difference of stored depths would show the straight lines between them."""
+    speed = np.interp(FRACTIONS * run.stopping_time, run.time, run.velocity)
+    depth, stop = run.penetration_depth, run.stopping_time
+    return np.concatenate([[np.log(depth), np.log(stop)], speed * stop / depth])
+
+
+def decode_speed(code: FloatArray, time: FloatArray) -> FloatArray:
+    """Speed (m/s) at times (s, since contact, >= 0) of what ``encode_speeds`` made; held after the last fraction."""
+    depth, stop = np.exp(code[0]), np.exp(code[1])
+    return depth / stop * _draw_spline(code)(np.clip(time / stop, 0.0, FRACTIONS[-1]))
+
+
 def decode_depth(code: FloatArray, time: FloatArray) -> FloatArray:
     """Depth (m) at times (s, since contact, >= 0) of an encoded curve; held after the last fraction."""
     depth, stop = np.exp(code[0]), np.exp(code[1])

@@ -14,7 +14,7 @@ from ..effects.terms import apply_law
 from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..sph import DropSetting
-from .curves import encode_run
+from .curves import encode_run, encode_speeds
 from .forward import ResponseTable
 from .grid import Family, RunGrid, few_positions, speed_nodes
 from .observations import Observation, RunFeatures, observe_further
@@ -59,13 +59,22 @@ def open_workbench(
     observations: list[Observation] = []
     models: list[DropModel | AccelerationModel] = []
     features: list[RunFeatures] = []
+    of_speeds: list[RunFeatures] = []
     for projectile, group in group_alike((drop.drop.projectile, drop) for drop in drops).items():
         nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
         table = ResponseTable(np.log(nodes), few)
         features.append(RunFeatures(len(families), table, encode_run))
         families.append(Family(projectile, nodes, False, few))
-        models += [_make_model(drop, table) for drop in group]
-    observations.append(Tracks(tuple(models), tuple(features)))
+        speeds = ResponseTable(np.log(nodes), few)
+        if any(isinstance(drop, ObservedImpact) for drop in group):
+            of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
+        models += [
+            make_acceleration_model(drop, speeds)
+            if isinstance(drop, ObservedImpact)
+            else make_drop_model(drop, table)
+            for drop in group
+        ]
+    observations.append(Tracks(tuple(models), (*features, *of_speeds)))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
         nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
@@ -121,12 +130,6 @@ def extend(bench: Workbench, model: Model) -> None:
 
     bench.model = model
     bench.grid.extension = apply
-
-
-def _make_model(drop: ObservedDrop | ObservedImpact, table: ResponseTable) -> DropModel | AccelerationModel:
-    if isinstance(drop, ObservedImpact):
-        return make_acceleration_model(drop, table)
-    return make_drop_model(drop, table)
 
 
 def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float, ...], tuple[int, ...]]:

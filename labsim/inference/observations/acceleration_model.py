@@ -18,7 +18,8 @@ import numpy as np
 
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
-from ..forward import Instant, ResponseTable, predict_speed
+from ..curves import decode_speed
+from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
 # of the largest deceleration, of a mean over 1/BINS of the stop: force noise of particles and of the table, neighbours half
@@ -83,10 +84,7 @@ class AccelerationModel:
     def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Mean specific force (m/s²) over each stretch, (n,), of an encoded curve."""
         begin, end = self.observed.begin, self.observed.end
-        plain = Instrument()  # scale and clock of a camera are none of an accelerometer
-        before, after = (
-            predict_speed(code, t, instant, plain.pixel_factor, plain.rate_factor) for t in (begin, end)
-        )
+        before, after = (_find_speed(code, t - instant.contact_time, instant) for t in (begin, end))
         return STANDARD_GRAVITY - (after - before) / (end - begin)
 
     def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
@@ -143,6 +141,12 @@ class AccelerationModel:
         after = Instant(before.contact_time + best[0] * free, before.log_speed + best[1] * speed_width, 0.0)
         stretch = float(np.median(self.observed.end - self.observed.begin))
         return after, max(abs(best[0] * free) / stretch, abs(best[1] * speed_width) * 100)
+
+
+def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
+    """m/s, free fall before contact."""
+    falling = math.exp(instant.log_speed) + STANDARD_GRAVITY * clock
+    return np.where(clock < 0.0, falling, decode_speed(code, np.maximum(clock, 0.0)))
 
 
 def make_acceleration_model(observed: ObservedImpact, table: ResponseTable) -> AccelerationModel:

@@ -1,0 +1,80 @@
+"""p_m from accelerometers: motions of a law in closed form, whose truth is known."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import accelerations
+import laws
+import numpy as np
+import pytest
+
+from labsim.campaign import read_campaign
+from labsim.cli.measured import write_measured_diagnosis
+from labsim.diagnosis.campaign import diagnose_campaign
+from labsim.inference.calibrate import calibrate, prepare
+from labsim.inference.observations.acceleration_model import AccelerationModel
+
+
+def fit(folder: Path, tmp_path: Path):  # type: ignore[no-untyped-def]
+    found = calibrate(read_campaign(folder), store=laws.LawStore(tmp_path / "store"), workers=1)
+    return found, np.quantile(found.posterior.data.posterior["p_m_Pa"], [0.05, 0.95])
+
+
+@pytest.mark.parametrize(
+    ("p_m", "noise", "scale"), [(800.0, 0.005, 1.01), (1300.0, 0.02, 0.99), (2600.0, 0.01, 1.0)]
+)
+def test_p_m_lies_in_its_interval(tmp_path: Path, p_m: float, noise: float, scale: float) -> None:
+    folder = accelerations.write_campaign(tmp_path / "c", p_m=p_m, noise=noise, scale=scale)
+    found, (low, high) = fit(folder, tmp_path)
+    assert low < p_m < high and high / low < 1.25
+    assert found.p_value > 0.05
+
+
+def test_an_accelerometer_stands_beside_cameras(tmp_path: Path) -> None:
+    """Three drops of each: both are compared, the interval holds the truth, a spoilt scale of the sensor shows as a misfit."""
+    felt = accelerations.write_campaign(tmp_path / "felt", scale=1.25)
+    seen = laws.write_campaign(tmp_path / "c")
+    for name in ("D01", "D03", "D05"):
+        shutil.rmtree(seen / "drops" / name)
+        shutil.copytree(felt / "drops" / name, seen / "drops" / name)
+    spoilt, _ = fit(seen, tmp_path)
+    sound_felt = accelerations.write_campaign(tmp_path / "sound")
+    for name in ("D01", "D03", "D05"):
+        shutil.copy(sound_felt / "drops" / name / "acceleration.csv", seen / "drops" / name)
+    sound, (low, high) = fit(seen, tmp_path)
+    kinds = [isinstance(model, AccelerationModel) for model in sound.bench.tracks.models]
+    assert kinds == [True, False] * 3
+    assert low < 1300.0 < high and sound.p_value > 0.05
+    assert spoilt.fit.chi_square > sound.fit.chi_square + 30
+
+
+def test_errors_of_an_acceleration_integrate_to_depths(tmp_path: Path) -> None:
+    """A constant error of 1 m/s² makes -t²/2 of depth at the end of each stretch, counted from contact."""
+    folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
+    bench, _ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = bench.tracks.models[0]
+    assert isinstance(model, AccelerationModel)
+    begin = model.observed.begin[model.below][0]
+    depth = model.lengths @ np.ones(model.data.size)
+    expected = -0.5 * (model.observed.end - begin) ** 2
+    np.testing.assert_allclose(depth[model.below], expected[model.below], rtol=0.02, atol=1e-9)
+
+
+def test_diagnosis_draws_and_states_held_out_records(tmp_path: Path) -> None:
+    folder = accelerations.write_campaign(tmp_path / "c")
+    found = diagnose_campaign(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    (tmp_path / "out").mkdir()
+    write_measured_diagnosis(found, tmp_path / "out")
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    gain = said["gain"]
+    assert 0.0 < gain["rms_nominal_m"] < 1e-4 and math.isfinite(gain["rms_noise_m"])
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "acceleration (g)" in page
+    assert (tmp_path / "out" / "drops.png").stat().st_size > 10_000
+    assert {"pixel_scale", "frame_rate", "surface_row"}.isdisjoint(
+        each["name"] for each in said.get("causes", [])
+    )
