@@ -81,7 +81,7 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
     for model in bench.tracks.models:
         section = linear.sections[model.observed.name]
         below = np.zeros(section.stop - section.start, dtype=bool)
-        below[: model.data.size] = model.below
+        below[: model.data.size] = model.held
         held = np.zeros(linear.residual.size, dtype=bool)
         held[section] = below
         seen = ~held
@@ -92,7 +92,7 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
         weights = cho_solve(factor, cross.T).T
         reach = design[held] - cross @ solved
         spread = linear.covariance[np.ix_(held, held)] - weights @ cross.T + reach @ covariance @ reach.T
-        lengths = model.lengths[np.ix_(model.below, model.below)]
+        lengths = model.lengths[np.ix_(model.held, model.held)]
         drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread, lengths))
     return drops, pull, precision
 

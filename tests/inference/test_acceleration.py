@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 from pathlib import Path
 
@@ -71,10 +70,10 @@ def test_diagnosis_draws_and_states_held_out_records(tmp_path: Path) -> None:
     write_measured_diagnosis(found, tmp_path / "out")
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     gain = said["gain"]
-    assert 0.0 < gain["rms_nominal_m"] < 1e-4 and math.isfinite(gain["rms_noise_m"])
+    assert 0.0 < gain["rms_nominal_m"] < 3 * gain["rms_noise_m"] < 2e-4
     page = (tmp_path / "out" / "report.html").read_text()
     assert "acceleration (g)" in page
     assert (tmp_path / "out" / "drops.png").stat().st_size > 10_000
     assert {"pixel_scale", "frame_rate", "surface_row"}.isdisjoint(
-        each["name"] for each in said.get("causes", [])
+        name for each in said["causes"] for name in each["causes"]
     )

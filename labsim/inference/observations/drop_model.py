@@ -72,6 +72,11 @@ class DropModel:
         return self.data > 3 * self.observed.sigma
 
     @property
+    def held(self) -> np.ndarray:
+        """What the other drops are asked to predict; free fall above says when contact is, and how fast."""
+        return self.below
+
+    @property
     def size(self) -> FloatArray:
         """What a law that is off by a share changes by that share, m."""
         return np.maximum(self.data, 0.0)
