@@ -82,8 +82,8 @@ def write(folder: Path, p_m: float, noise: float, shear: float, rng: np.random.G
         contact = 0.02 + true_speed / STANDARD_GRAVITY + rng.uniform(0, 1 / RATE)
         edges = np.arange(0.0, contact + 3 * run.stopping_time, 1 / RATE)
         clock = edges - contact
-        fall = np.where(clock < 0.02 - contact, 0.0, true_speed + STANDARD_GRAVITY * clock)
-        inside = np.interp(clock, run.time, run.velocity) * (clock < run.time[-1])
+        fall = np.where(clock < -true_speed / STANDARD_GRAVITY, 0.0, true_speed + STANDARD_GRAVITY * clock)
+        inside = np.interp(clock, run.time, run.velocity) * (clock < run.stopping_time)
         felt = 1 - np.diff(np.where(clock < 0, fall, inside)) * RATE / STANDARD_GRAVITY
         sigma = noise * felt.max()
         felt = scale * felt + 0.05 * rng.standard_normal() + sigma * rng.standard_normal(felt.size)
@@ -107,8 +107,9 @@ def main() -> None:
         low, middle, high = np.quantile(found.posterior.data.posterior["p_m_Pa"], [0.05, 0.5, 0.95])
         inside += (low < p_m < high) * (k < count)
         print(
-            f"{k + 1:2d}  hidden {p_m:.0f} Pa, noise {100 * noise:.1f} %, shear {shear:g}: {middle:.0f} ({low:.0f} to {high:.0f}), "
-            f"p = {found.p_value:.2g}, chi² {found.fit.chi_square:.0f} of {found.fit.points}, off {100 * (middle / p_m - 1):+.1f} %",
+            f"{k + 1:2d}  hidden {p_m:.0f} Pa, noise {100 * noise:.1f} %, shear {shear:g}: {middle:.0f} "
+            f"({low:.0f} to {high:.0f}), "
+            f"p = {found.p_value:.2g}, off {100 * (middle / p_m - 1):+.1f} %",
             flush=True,
         )
         for line in found.warnings:

@@ -33,8 +33,10 @@ def make_fit(seed: int, *, hidden: float = 0.0):
     drops = DropsBlock(residual, covariance, tangents, sections=sections)
     models = [
         SimpleNamespace(
-            matrix=np.eye(POINTS),
-            observed=SimpleNamespace(name=name, depth=depth[sections[name]], sigma=1e-6),
+            data=depth[sections[name]],
+            held=depth[sections[name]] > 3e-6,
+            lengths=np.eye(POINTS),
+            observed=SimpleNamespace(name=name),
         )
         for name in NAMES
     ]

@@ -22,8 +22,8 @@ from ..curves import decode_speed
 from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
-# of the largest deceleration, of a mean over 1/BINS of the stop: two spacings differ by 0.9 to 1.6 %, neighbours up to half alike,
-# the table of speeds by 0.3 to 0.6 % (benchmarks/acceleration_error.py)
+# of the largest deceleration, of a mean over 1/BINS of the stop: two spacings differ by 0.9 to 1.6 %, neighbours up to half
+# alike, the table of speeds by 0.3 to 0.6 % (benchmarks/acceleration_error.py)
 FORCE_NOISE = 0.02
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
 BLOW, BLOW_LENGTH = 0.10, 0.03
