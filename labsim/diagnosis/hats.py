@@ -12,8 +12,6 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
 from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
 from ..effects.terms import Knots, add_table
