@@ -1,6 +1,6 @@
 """p_m of campaigns of accelerometers whose truth is known: the solver at a finer spacing, hidden p_m, noise, zero and scale.
 
-    python benchmarks/acceleration_hidden.py [CAMPAIGNS]
+    python benchmarks/acceleration_hidden.py [CAMPAIGNS [SEED]]
 
 Prints hidden p_m, its 90 % interval, and the p value; the last campaign hides a shear strength of 0.6 of the stated one.
 """
@@ -97,7 +97,7 @@ def write(folder: Path, p_m: float, noise: float, shear: float, rng: np.random.G
 
 def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 8
-    rng, inside = np.random.default_rng(2), 0
+    rng, inside = np.random.default_rng(int(sys.argv[2]) if len(sys.argv) > 2 else 2), 0
     for k in range(count + 1):
         p_m, noise = math.exp(rng.uniform(math.log(900), math.log(2000))), rng.uniform(0.005, 0.02)
         shear = 0.6 if k == count else 1.0

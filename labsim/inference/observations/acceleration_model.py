@@ -22,11 +22,13 @@ from ..curves import decode_speed
 from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
-# of the largest deceleration, of a mean over 1/BINS of the stop: two spacings differ by 0.9 to 1.6 %, neighbours up to half
-# alike, the table of speeds by 0.3 to 0.6 % (benchmarks/acceleration_error.py)
-FORCE_NOISE = 0.02
+# of the largest deceleration, of a mean over 1/BINS of the stop: two spacings differ by 0.9 to 1.6 %, the table of speeds by 0.3
+# to 0.6 %; neighbours have a correlation of up to 0.62 (benchmarks/acceleration_error.py), here one half
+FORCE_NOISE, FORCE_LENGTH = (
+    0.02,
+    1.0 / BINS / math.sqrt(2.0 * math.log(2.0)),
+)  # the second of the stopping time
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
-BLOW, BLOW_LENGTH = 0.10, 0.03
 
 
 @dataclass(frozen=True)
@@ -124,12 +126,15 @@ class AccelerationModel:
             for k, each in enumerate(accelerometer.sensors)
         }
 
-    def add_solver_noise(self, here: FloatArray, clock: FloatArray, stop: float) -> FloatArray:
-        """Variance (n,) of the solver's force, independent in each stretch."""
-        width = self.observed.end - self.observed.begin
+    def find_solver_noise(self, here: FloatArray, stop: float) -> FloatArray:
+        """(n, n) root of the covariance of what is particle noise in the force, by columns."""
+        observed = self.observed
+        width = observed.end - observed.begin
         shares = FORCE_NOISE * np.sqrt(stop / BINS / np.minimum(width, stop))
-        sigma = shares * float(np.max(np.abs(here)))
-        return np.where(self.observed.end > self.observed.contact_time - 0.5 * stop / BINS, sigma**2, 0.0)
+        sigma = np.where(observed.end > observed.contact_time - 0.5 * stop / BINS, shares, 0.0)
+        middle = 0.5 * (observed.begin + observed.end) / (FORCE_LENGTH * stop)
+        alike = np.exp(-0.5 * np.subtract.outer(middle, middle) ** 2) + 1e-9 * np.eye(middle.size)
+        return np.asarray(float(np.max(np.abs(here))) * sigma[:, None] * np.linalg.cholesky(alike))
 
     def in_dust(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument

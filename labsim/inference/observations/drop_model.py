@@ -117,9 +117,9 @@ class DropModel:
             "contact offset": np.full(here.size, contact * self.radius),
         }
 
-    def add_solver_noise(self, here: FloatArray, clock: FloatArray, stop: float) -> FloatArray:
-        """Variance (n,) of the solver that is independent in each datum; a depth has none."""
-        return np.zeros(here.size)
+    def find_solver_noise(self, here: FloatArray, stop: float) -> FloatArray:
+        """(n, 0): depths have none that is not smooth."""
+        return np.zeros((here.size, 0))
 
     def in_dust(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument

@@ -136,7 +136,8 @@ def linearise_drop(
         zeros[:, 0],
         by_strength * max(scatter, LEAST_SCATTER),
     ]
-    local = np.column_stack([*columns, zeros[:, 1:]])
+    final, stop = np.exp(code[0]), np.exp(code[1])
+    local = np.column_stack([*columns, zeros[:, 1:], model.find_solver_noise(here, float(stop))])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
 
@@ -148,7 +149,6 @@ def linearise_drop(
     # tip radii, thus in spacings: with it, drops of all sizes, speeds and hidden effects lie on one curve, with speed they do not
     reach = float(code[0]) - math.log(model.radius)
     clock = model.mean_time(instrument) - instant.contact_time
-    final, stop = np.exp(code[0]), np.exp(code[1])
     shared = {
         **model.share(differ, here, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
         "numerical slope": np.maximum(here, 0.0) * (reach - USUAL_DEPTH) * terms.numerical_slope,
@@ -167,7 +167,7 @@ def linearise_drop(
     )
     drop = DropTerms(
         model.data - here,
-        model.data_variance + model.add_solver_noise(here, clock, stop),
+        model.data_variance,
         local,
         pull,
         tangents,
