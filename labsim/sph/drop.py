@@ -28,6 +28,7 @@ from .tips import make_profile
 
 STEPS_AT_ONCE = 64
 LEAST = 0.1  # of the skin: a list that allows less is made anew
+SHORTEST = 1e-3  # of the first step: a shorter one follows a single point that has collapsed, and would never end
 
 
 @dataclass
@@ -112,6 +113,7 @@ def evolve(
     )
     made, builds, stop_step, limit = 0, 0, None, min([setting.duration, *path[0][-1:]])
     farthest = 1000 * (np.abs(dust[[rows.X, rows.Z]]).max() + setting.spacing)
+    first_step = 0.0
     while body[TIME] < limit:
         if not np.abs(state[[rows.X, rows.Z], :n]).max() < farthest:
             raise _blown_up(setting, made, body[TIME])
@@ -148,6 +150,12 @@ def evolve(
             if done < 0 or not np.isfinite(body).all():
                 raise _blown_up(setting, made + max(done, 0), body[TIME])
             made += done
+            first_step = first_step or body[LAST_STEP]
+            collapsed = body[LAST_STEP] < SHORTEST * first_step
+            if collapsed and stop_step is None:
+                raise _blown_up(setting, made, body[TIME])
+            if collapsed:  # after the stop there is nothing left to wait for
+                limit = body[TIME]
             fresh = done == steps
             if body[SPEED] >= 0.0 and stop_step is None and not led:
                 stop_step = made

@@ -227,6 +227,22 @@ def test_four_spacings_across_the_tip_will_do():
     check_setting(a_drop(spacing=RADIUS / 4))
 
 
+def test_dust_that_hardly_holds_together_comes_to_an_end():
+    """A twentieth of the tensile strength in soft dust: after the stop a point collapses, and its steps become ever shorter. The
+    motion up to the stop is known by then, and the run ends there."""
+    setting = DropSetting(
+        Projectile("hemisphere", 0.5e-3, 3.3249e-6),
+        1.419857,
+        Material(p_m=500.0, tensile_log10_a=2.8 + math.log10(0.05)),
+        spacing=1e-4,
+        after_stop=0.16,
+    )
+    run = simulate(setting)
+    assert run.stopped and run.steps < 20_000
+    assert run.stopping_time <= run.time[-1] < 1.16 * run.stopping_time
+    assert np.diff(run.time).min() > 1e-10
+
+
 def test_a_run_that_blows_up_names_its_parameters():
     with pytest.raises(SimulationError, match=r"blew up after \d+ steps.*courant=12"):
         simulate(a_drop(numerics=Numerics(courant=12.0)))
