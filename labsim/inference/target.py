@@ -11,6 +11,7 @@ import numpy as np
 from ..effects import Parameter
 from ..errors import InferenceError
 from ..records import FloatArray
+from .blocks import whiten_all
 from .fitting import Fit
 from .observations.acceleration_model import AccelerationModel
 from .posterior import QuadraticResidual, measure_residual
@@ -57,7 +58,7 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
     names = ("p_m_Pa", *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)))
     centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
 
-    def residual(theta: FloatArray) -> FloatArray:
+    def miss(theta: FloatArray) -> FloatArray:
         values = dict(zip(fit.hypothesis, theta[1:], strict=True))
         blocks = linearise_at(bench, fit.nuisances, float(theta[0]), values)
         return np.concatenate(
@@ -68,9 +69,15 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
     bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
     nulls = tuple(parameter.null for parameter in parameters)
     at_end = any(math.isclose(fit.log_p_m, end, abs_tol=1e-9) for end in bounds[0])
-    # accelerations of runs at neighbouring p_m differ by the noise of their particles, which a parabola takes for a bend
-    felt = any(isinstance(model, AccelerationModel) for model in bench.tracks.models)
-    misfit = measure_residual(residual, centre, fit.covariance, straight=at_end or felt)
+    # accelerations of runs at two p_m differ by the noise of their particles too, which a secant takes for what p_m changes and
+    # the solver's error of p_m, which lies along the tangent at the fit, does not cover
+    if any(isinstance(model, AccelerationModel) for model in bench.tracks.models):
+        white = whiten_all(fit.blocks, ["ln_p_m", *fit.hypothesis])
+        misfit = measure_residual(
+            lambda theta: white[:, 0] - white[:, 1:] @ (theta - centre), centre, fit.covariance
+        )
+    else:
+        misfit = measure_residual(miss, centre, fit.covariance, straight=at_end)
     return Target(names, nulls, parameters, misfit, np.array(bounds))
 
 

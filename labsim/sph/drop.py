@@ -28,7 +28,9 @@ from .tips import make_profile
 
 STEPS_AT_ONCE = 64
 LEAST = 0.1  # of the skin: a list that allows less is made anew
-SHORTEST = 1e-3  # of the first step: a shorter one follows a single point that has collapsed, and would never end
+SHORTEST = (
+    1e-3  # of the first step: a shorter one follows a single point that has collapsed, and would never end
+)
 
 
 @dataclass
