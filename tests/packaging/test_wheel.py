@@ -96,6 +96,12 @@ def test_the_sdist_builds_the_same_wheel(tmp_path: Path, wheel: Path) -> None:
     assert set(zipfile.ZipFile(again).namelist()) == set(zipfile.ZipFile(wheel).namelist())
 
 
+def test_an_installed_wheel_has_its_pages(installed: Path, tmp_path: Path) -> None:
+    assert (ROOT / "docs" / "limits.md").read_text(encoding="utf-8").strip() == labsim(
+        installed, tmp_path, "docs", "limits"
+    ).strip()
+
+
 def test_an_installed_wheel_works_alone(installed: Path, tmp_path: Path) -> None:
     code = "import labsim, labsim.cli.demo as d; print(labsim.__file__); print(d.find_data('guettler2009'))"
     environment = {**os.environ, "PYTHONPATH": str(installed)}
