@@ -71,7 +71,10 @@ class CommandFolder(typer.core.TyperGroup):
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         for parameter in self.get_params(ctx):
-            if isinstance(parameter, typer.core.TyperOption) and parameter.name == "show_completion":
+            if isinstance(parameter, typer.core.TyperOption) and parameter.name in (
+                "show_completion",
+                "install_completion",
+            ):
                 parameter.hidden = True  # works as ever; the page fits a screen
         super().format_options(ctx, formatter)
 
