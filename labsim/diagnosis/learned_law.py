@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..effects import Effect, Normal, Parameter
-from ..effects.terms import Term, add_term, list_terms
+from ..effects.terms import KNOTS, Term, add_term, list_terms
 from ..errors import LabsimError
 from ..inference.fitting import Fit, fit_hypothesis
 from ..inference.workbench import Workbench
@@ -103,27 +103,35 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
 
 
 def find_peak(term: Term, law: FreeLaw) -> float:
-    """The largest value of a term's shape at the knots that the data reach."""
-    return float(np.max(np.abs(term.shape(_arguments(law)))))
+    """The largest value of a term's shape between what the data reach, which may lie between knots or before the last."""
+    return float(np.max(np.abs(_shape(term, law, np.linspace(*law.reach, KNOTS)))))
 
 
-def _arguments(law: FreeLaw) -> FloatArray:
-    """Knots of a law as its terms take them: compaction, tip radii, m/s."""
-    knots = np.array(law.knots)
-    return knots - law.grid[0] if law.over == "filling factor" else knots
+def share_hats(term: Term, law: FreeLaw) -> FloatArray:
+    """Heights of the law's hats whose sum is nearest to the term. Its values at the knots are not: a film between two is lost."""
+    places = np.linspace(law.grid[0], max(law.knots), KNOTS)
+    hats = [np.interp(places, law.grid, [float(place == knot) for place in law.grid]) for knot in law.knots]
+    heights: FloatArray = np.linalg.lstsq(np.stack(hats, axis=1), _shape(term, law, places), rcond=None)[0]
+    return heights
+
+
+def _shape(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:
+    """A term at places of a law; it takes compaction where the law goes with the filling factor."""
+    return term.shape(places - law.grid[0] if law.over == "filling factor" else places)
 
 
 def weigh_formulas(
     tangents: Tangents, terms: Mapping[str, Term], peaks: Mapping[str, float], limits: tuple[float, float]
 ) -> list[tuple[tuple[str, ...], Marginal]]:
     """Terms by themselves and in pairs, those with most evidence first; a pair only where it promises LEAST_GAIN over its better
-    part. Coefficients are in units of the law where the term is largest; one on the wrong side of a limit is refused."""
+    part, and over nothing. Coefficients are in units of the law where the term is largest; one on the wrong side of a limit is
+    refused."""
     laws = {law.name: law for law in tangents.laws}
     columns = np.zeros((len(tangents.gram), 2 + len(terms)))
     columns[0, 0] = columns[1, 1] = 1.0
     for k, (name, term) in enumerate(terms.items(), start=2):
         law = laws[term.place]
-        for hat, share in zip(law.hats, term.shape(_arguments(law)) / peaks[name], strict=True):
+        for hat, share in zip(law.hats, share_hats(term, law) / peaks[name], strict=True):
             columns[tangents.names.index(hat) + 1, k] = share
     gram = columns.T @ tangents.gram @ columns
     reduced = replace(tangents, names=("ln_p_m", *terms), gram=gram)
@@ -136,13 +144,12 @@ def weigh_formulas(
         signs = zip(names, marginal.coefficients[1:], strict=True)
         return all(terms[name].limits[0] < 0.0 if c < 0 else terms[name].limits[1] > 0.0 for name, c in signs)
 
+    nothing, _ = weigh(())
     weighed: dict[tuple[str, ...], tuple[float, Marginal]] = {}
     for names in [(name,) for name in terms] + list(combinations(terms, 2)):
         evidence, marginal = weigh(names)
         parts = [weighed[part,][0] for part in names if (part,) in weighed]
-        if allowed(names, marginal) and (
-            len(names) == 1 or evidence > max(parts, default=-math.inf) + LEAST_GAIN
-        ):
+        if allowed(names, marginal) and (len(names) == 1 or evidence > max([nothing, *parts]) + LEAST_GAIN):
             weighed[names] = evidence, marginal
     ranked = sorted(weighed, key=lambda names: -weighed[names][0])
     return [(names, weighed[names][1]) for names in ranked]

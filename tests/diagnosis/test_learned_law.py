@@ -7,7 +7,7 @@ import pytest
 
 from labsim.diagnosis.free_law import Tangents, gather
 from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, STEP, FreeLaw
-from labsim.diagnosis.learned_law import USUAL, find_peak, make_effect, weigh_formulas
+from labsim.diagnosis.learned_law import USUAL, find_peak, make_effect, share_hats, weigh_formulas
 from labsim.effects.terms import add_term, list_terms
 from labsim.inference.blocks import Block
 from labsim.records import Material, Projectile
@@ -33,7 +33,7 @@ def made_up(hidden: dict[str, float], seed: int = 2) -> Tangents:
     for name, size in hidden.items():
         term = TERMS[name]
         law = next(law for law in LAWS if law.name == term.place)
-        for hat, share in zip(law.hats, term.shape(np.array(law.knots)) / PEAKS[name], strict=True):
+        for hat, share in zip(law.hats, share_hats(term, law) / PEAKS[name], strict=True):
             residual += size * share * tangents[hat]
     block = Block(residual, np.eye(300), tangents)
     gram, log_determinant, points = gather([block], HATS, dict.fromkeys(HATS, 1.0))
@@ -70,6 +70,27 @@ def test_where_nothing_is_hidden_no_pair_stands_out():
         ranked = weigh_formulas(made_up({}, seed), TERMS, PEAKS, LIMITS)
         pairs += len(ranked[0][0]) - 1
     assert pairs <= 1
+
+
+def test_a_term_is_measured_where_the_data_are():
+    """Its unit is that at the fastest drop, not at a knot beyond; a film between two knots is as high as any other."""
+    slow = FreeLaw("force of speed", "speed", "m/s", (0.0, *SPEEDS), SPEEDS, (0.0, 0.7), "Pa", PRESSURE)
+    assert find_peak(TERMS["inertial_drag"], slow) == pytest.approx(0.49)
+    for name in ("film_at_1_5", "film_at_3"):
+        assert PEAKS[name] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("name", sorted(TERMS))
+def test_hats_come_as_near_to_a_term_as_they_can(name):
+    """What they leave is at right angles to every hat; its values at the knots leave more, or are the same."""
+    term = TERMS[name]
+    law = next(law for law in LAWS if law.name == term.place)
+    places = np.linspace(0.0, law.knots[-1], 97)
+    hats = np.stack([np.interp(places, law.grid, np.equal(law.grid, knot)) for knot in law.knots], axis=1)
+    left = term.shape(places) - hats @ share_hats(term, law)
+    assert np.abs(hats.T @ left).max() < 1e-9 * (1 + np.abs(term.shape(places)).sum())
+    at_knots = term.shape(places) - hats @ term.shape(np.array(law.knots))
+    assert left @ left <= at_knots @ at_knots + 1e-9
 
 
 def test_a_term_as_an_effect_is_the_term():
