@@ -82,7 +82,8 @@ def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]
     figures.draw_causes(found, folder / "causes.png")
     (folder / "law.png").unlink(missing_ok=True)
     if found.verdict.word == "unknown" and found.unknown.laws:
-        draw_laws(found.unknown.laws, folder / "law.png")
+        learned = found.learned.best if found.learned else None
+        draw_laws(found.unknown.laws, folder / "law.png", learned)
     figures.draw_held_out(found, [name for name, _ in fits], folder / "held_out.png")
     figures.draw_p_m(posteriors, folder / "posterior.png")
     figures.draw_posterior(found.posterior_extended, folder / "corner.png")

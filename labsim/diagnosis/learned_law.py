@@ -104,18 +104,18 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
 
 def find_peak(term: Term, law: FreeLaw) -> float:
     """The largest value of a term's shape between what the data reach, which may lie between knots or before the last."""
-    return float(np.max(np.abs(_shape(term, law, np.linspace(*law.reach, KNOTS)))))
+    return float(np.max(np.abs(shape_at(term, law, np.linspace(*law.reach, KNOTS)))))
 
 
 def share_hats(term: Term, law: FreeLaw) -> FloatArray:
     """Heights of the law's hats whose sum is nearest to the term. Its values at the knots are not: a film between two is lost."""
     places = np.linspace(law.grid[0], max(law.knots), KNOTS)
     hats = [np.interp(places, law.grid, [float(place == knot) for place in law.grid]) for knot in law.knots]
-    heights: FloatArray = np.linalg.lstsq(np.stack(hats, axis=1), _shape(term, law, places), rcond=None)[0]
+    heights: FloatArray = np.linalg.lstsq(np.stack(hats, axis=1), shape_at(term, law, places), rcond=None)[0]
     return heights
 
 
-def _shape(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:
+def shape_at(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:
     """A term at places of a law; it takes compaction where the law goes with the filling factor."""
     return term.shape(places - law.grid[0] if law.over == "filling factor" else places)
 

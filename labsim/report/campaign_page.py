@@ -87,7 +87,7 @@ def write_campaign_page(
     figures["held_out"] = plot_held_out(found.held_out_nominal.names, held, found.held_out_extended.expected)
     causes, laws = describe_causes(found, summary), describe_laws(found)
     for row, law in zip(laws["rows"] if laws else [], found.unknown.laws, strict=False):
-        figures[row["figure"]] = plot_law(law)
+        figures[row["figure"]] = plot_law(law, found.learned.best if found.learned else None)
     confusable = list_confusable(found)
     return _write(
         folder,

@@ -210,6 +210,7 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
             f" A free law without a place in the equations ({unknown.block}) says more of these data, by {ahead:.0f} in ln "
             "evidence: read the curves as the nearest that such a law comes to what is missing."
         )
+    drawn = {term.place for term in found.learned.best.terms} if found.learned else set()
     rows = []
     for k, law in enumerate(unknown.laws):
         points = ", ".join(
@@ -220,7 +221,8 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
             {
                 "figure": f"law{k}",
                 "title": _begin(law.law.name),
-                "text": f"{_begin(value_label(law))} against {place_label(law)}: {points}. The band holds 68 %.",
+                "text": f"{_begin(value_label(law))} against {place_label(law)}: {points}. The band holds 68 %."
+                + (" Dashed: the formula." if law.law.name in drawn else ""),
             }
         )
     learned = [*say_learned(found), "labsim simulate --model model.toml simulates a drop with it"]
