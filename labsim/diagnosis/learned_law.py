@@ -70,12 +70,14 @@ class LearnedLaw:
 
 
 def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOut) -> LearnedLaw | None:
-    """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model.
+    """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
+    and gives held-out drops a higher probability.
 
     before : the nominal model's predictions of held-out drops.
     """
     laws = {law.name: law for law in tangents.laws if law.knots}
-    terms = {name: term for name, term in list_terms().items() if term.place in laws}
+    # an effect of that name has been tried as a cause
+    terms = {n: term for n, term in list_terms().items() if term.place in laws and n not in bench.effects}
     peaks = {name: find_peak(term, laws[term.place]) for name, term in terms.items()}
     terms = {name: term for name, term in terms.items() if peaks[name] > 0}
     effects = {name: make_effect(term, laws[term.place].scale / peaks[name]) for name, term in terms.items()}
@@ -95,8 +97,9 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
             continue  # its runs fail: no formula for this dust
         if fit.evidence > nominal.evidence + LEAST_GAIN:
             held_out = predict_held_out(free, fit)
-            chosen = tuple(terms[name] for name in names)
-            formulas.append(Formula(chosen, fit, held_out, measure_gain(before, held_out)))
+            gain = measure_gain(before, held_out)
+            if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
+                formulas.append(Formula(tuple(terms[name] for name in names), fit, held_out, gain))
     if not formulas:
         return None
     return LearnedLaw(tuple(sorted(formulas, key=lambda each: -each.fit.evidence)), free)
