@@ -1,7 +1,7 @@
 """What an effect is: the records that its file is made of and is called with.
 
 An effect is a file with module-level names (docs/effects.md has them in a table): title, kind, parameters, leaves,
-references, expect, needs, applies(campaign) and at least one of change_setting(setting, values, place) and
+references, expect, needs, remedy, applies(campaign) and at least one of change_setting(setting, values, place) and
 change_instrument(instrument, values, place). Every effect is a nested extension of the nominal model: at the null of its
 parameters it changes nothing, bit for bit.
 """
@@ -151,6 +151,9 @@ class Effect:
     change_instrument: ChangeInstrument | None = field(repr=False)
     resolve: Callable[[Campaign], tuple[Parameter, ...]] = field(repr=False)
     description: str = ""
+    remedy: str = (
+        ""  # what to do about it; {value} is its first parameter. Where it says nothing, its kind does
+    )
 
     def applies(self, campaign: Campaign) -> str:
         """Empty if the effect can be at work in this campaign, else the reason why not."""

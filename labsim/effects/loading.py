@@ -199,6 +199,15 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
     needs = getattr(module, "needs", ())
     if not isinstance(needs, tuple) or not all(isinstance(each, str) for each in needs):
         raise EffectError(file, "needs", f'{needs!r} is not a tuple of names; write needs = ("delta",)')
+    remedy = getattr(module, "remedy", "")
+    try:
+        remedy.format(value=1.0)
+    except (AttributeError, LookupError, ValueError):
+        raise EffectError(
+            file,
+            "remedy",
+            f"{remedy!r} is not a sentence; write text, in which {{value}} is the first parameter",
+        ) from None
 
     def reason_against(campaign: Campaign) -> str:
         law = campaign.material.law
@@ -227,6 +236,7 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
         change_instrument=instrument,
         resolve=resolve,
         description=inspect.cleandoc(module.__doc__ or ""),
+        remedy=remedy,
     )
 
 

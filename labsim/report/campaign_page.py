@@ -99,7 +99,7 @@ def write_campaign_page(
         page_title="what the simulation gets wrong",
         tone=found.verdict.word,
         badge=BADGES[found.verdict.word],
-        sentence=say_verdict(found),
+        sentence=f"{say_verdict(found)} {summary['remedy']}",
         tiles=tiles,
         calibration=describe_calibration(
             found.nominal, found.p_value, found.scatter, posteriors, found.bench, len(views)

@@ -12,6 +12,7 @@ from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
 from ..diagnosis.misfit import say_misfit
 from ..diagnosis.next_experiment import Suggestion
+from ..diagnosis.screen import group_classes
 from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
@@ -22,6 +23,7 @@ from ..records import FloatArray
 from ..sph import solver_hash
 from .law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
 from .phrases import CERTAIN, say_amount, say_combination, say_hypothesis, say_probability
+from .remedies import say_remedy
 
 NUMERICAL_DEPTH = (
     0.0033  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
@@ -129,9 +131,11 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "format": 1,
         "campaign": found.campaign.name,
         "verdict": found.verdict.word,
+        "remedy": say_remedy(found, suggestions),
         "p_value": found.p_value,
         "causes": causes,
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
+        "classes": group_classes(found.confusable),
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
         "law": describe_learned(found),
         "misfit": [asdict(part) for part in found.misfit],
@@ -243,7 +247,7 @@ def say_gain(gain: Gain) -> str:
 
 
 def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
-    lines = [*_say_doubts(found), say_verdict(found), ""]
+    lines = [*_say_doubts(found), say_verdict(found), say_remedy(found, suggestions), ""]
     lines.append("  probability  cause")
     worth = [each for each in found.verdict.probabilities if each[1] >= 5e-4][:6]
     for hypothesis, probability in worth:

@@ -161,6 +161,7 @@ def diagnosis_summary(diagnosis: SummaryDiagnosis) -> dict[str, Any]:
             {"causes": list(causes), "probability": probability, "parameters": {}}
             for causes, probability in diagnosis.verdict.probabilities
         ],
+        "classes": [],
         "confusable": [],
         "p_m_Pa": {"nominal": calibration.quantiles},
         "sentence": diagnosis.sentence,

@@ -85,6 +85,7 @@ BROKEN = {
     "no leaves": ('leaves = "', 'left = "', ["leaves", "is missing"]),
     "no references": ("references = (", "sources = (", ["references", "tuple of texts"]),
     "unknown observable": ('"penetration_depth": 1', '"depth": 1', ["expect", "penetration_depth"]),
+    "remedy not a sentence": ('expect = {', 'remedy = "{other}"\nexpect = {', ["remedy", "first parameter"]),
     "sign not a sign": ('"penetration_depth": 1', '"penetration_depth": 2', ["expect", "-1, 0 or 1"]),
     "changes nothing": ("def change_setting", "def change_nothing", ["change_setting", "at least one"]),
     "two arguments": ("(setting, values, place)", "(setting, values)", ["change_setting", "3 arguments"]),

@@ -25,6 +25,7 @@ def parameters(campaign):
 
 
 leaves = "The edge of the bead is soft, and the densest dust next to it is smeared into the halo; volumes are kept."
+remedy = "measure the scanner's point spread, on the edge of the bead"
 references = ("Convolution of Gaussians: variances add",)
 expect = {"penetration_depth": 0}
 

@@ -18,6 +18,10 @@ parameters = (
     ),
 )
 leaves = "Undisturbed dust in the scans has another filling factor than the sample, and the compacted volume follows."
+remedy = (
+    "calibrate the grey levels of the scanner again: filling factors read with them are {value:.3f} "
+    "times the true ones"
+)
 references = ("Bright, dark and known-density calibration of X-ray attenuation",)
 expect = {"compacted_volume": 1, "penetration_depth": 0}
 

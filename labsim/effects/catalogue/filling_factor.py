@@ -31,6 +31,7 @@ leaves = (
     "Strength and inertia of all dust change together (at 0.15 one percent in φ is seven percent in Σ), which p_m takes "
     "up almost entirely; undisturbed dust in the CT shows it directly."
 )
+remedy = "weigh the sample again: these data ask for filling_factor = {value:.4f} under [sample]"
 references = (
     "Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503: filling factor of random ballistic deposits",
 )

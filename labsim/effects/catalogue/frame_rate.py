@@ -20,6 +20,10 @@ leaves = (
     "Speeds and times of all drops are off and depths are not: gravity in the free fall before contact is off by the square "
     "of the factor, the speed against the drop height by the factor."
 )
+remedy = (
+    "ask the camera for its rate: these drops ask for a frame_rate_Hz that is {value:.3f} times "
+    "what drop.toml states"
+)
 references = ("Free fall: apparent g = g rate_factor^-2 / pixel_factor",)
 expect = {"penetration_depth": 0, "stopping_time": 1}
 

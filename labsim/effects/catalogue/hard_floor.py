@@ -36,6 +36,7 @@ leaves = (
     "The deepest drops, those of the largest tips, stop short and sooner; all others are as they should be. It is felt only "
     "where the tip comes within half its radius of the floor."
 )
+remedy = "use a deeper sample, or slower drops: the bottom is felt {value:.4g} m below the surface"
 references = (
     "Seguin, Bertho & Gondret (2008), Phys. Rev. E 78, 010301: influence of confinement on granular penetration by impact",
 )

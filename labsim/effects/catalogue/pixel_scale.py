@@ -20,6 +20,10 @@ leaves = (
     "Depths and speeds of all drops by the same factor, and the free fall before contact as well: gravity measured there is "
     "off by this factor, and the speed no longer agrees with the drop height."
 )
+remedy = (
+    "measure the scale again: these drops ask for a pixel_size_um that is {value:.3f} times what "
+    "drop.toml states"
+)
 references = ("Free fall: apparent g = g rate_factor^-2 / pixel_factor",)
 expect = {"penetration_depth": -1, "stopping_time": 0}
 

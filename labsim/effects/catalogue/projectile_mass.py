@@ -20,6 +20,10 @@ parameters = (
     ),
 )
 leaves = "Depth and stopping time of all drops by nearly the same factor, which p_m takes up; two masses at one radius help."
+remedy = (
+    "weigh the projectiles again: these drops ask for a mass_mg that is {value:.3f} times what "
+    "drop.toml states"
+)
 references = ("Güttler et al. (2009), Powders and Grains: D grows with m v/A",)
 expect = {"penetration_depth": 1, "stopping_time": 1}
 

@@ -22,6 +22,7 @@ parameters = (
     ),
 )
 leaves = "Residuals of the depth that follow the order of the drops and not speed or size."
+remedy = "keep the samples alike: the same storage and deposit for all, drops in a mixed order"
 references = ("Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503: strength depends on preparation",)
 expect = {"penetration_depth": -1}  # of the last drop
 

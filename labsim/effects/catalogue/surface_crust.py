@@ -41,6 +41,7 @@ leaves = (
     "An offset of depth that is about the same in mm for all drops, so that slow drops are affected most; small tips more "
     "than large ones. The CT shows it beside the bead if its voxels are finer than the crust."
 )
+remedy = "take the crust off, or keep it in the model: labsim simulate --model model.toml"
 references = (
     "Weidling, Güttler, Blum & Brauer (2009), arXiv:0902.3082: compaction of surfaces by handling and repeated impact",
 )

@@ -28,6 +28,10 @@ leaves = (
     "The same offset of depth in pixels in all drops, before and after contact, while the deceleration begins above or "
     "below the stated surface."
 )
+remedy = (
+    "look at the row of the surface again: these drops ask for a surface_row_px that is "
+    "{value:+.1f} from what drop.toml states"
+)
 references = ("Depth = (tip row - surface row) times pixel size",)
 expect = {"penetration_depth": 1, "stopping_time": 0}
 

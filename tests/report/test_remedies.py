@@ -1,0 +1,46 @@
+"""Every verdict says what to do: the effect's own words with the value found, or its kind's."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from labsim.effects import list_effects
+from labsim.report.remedies import BY_KIND, say_remedy
+
+EFFECTS = list_effects()
+
+
+def find(word, probabilities, value=1.06, learned=None, named=None):
+    posterior = SimpleNamespace(samples=lambda name: np.full(5, value))
+    return SimpleNamespace(
+        verdict=SimpleNamespace(word=word, probabilities=probabilities, named=named or probabilities[:1]),
+        bench=SimpleNamespace(effects=EFFECTS),
+        posterior_extended=posterior,
+        learned=learned,
+    )
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_effect_has_one(name):
+    said = say_remedy(find("effect", [((name,), 0.99)]), [])
+    assert said.endswith(".") and said[0].isupper() and "{" not in said
+    assert EFFECTS[name].remedy or BY_KIND[EFFECTS[name].kind].split(":")[0].lower() in said.lower()
+
+
+def test_a_scale_says_what_to_write():
+    said = say_remedy(find("effect", [(("pixel_scale",), 0.99)]), [])
+    assert "pixel_size_um that is 1.060 times" in said
+
+
+def test_two_that_are_hardly_told_apart_are_to_be_told_apart_first():
+    named = [(("shear_strength",), 0.6), (("tensile_strength",), 0.35)]
+    suggestion = SimpleNamespace(change="a bead of 2 mm at 0.3 m/s")
+    said = say_remedy(find("effect", named, named=named), [suggestion])
+    assert said.startswith("First tell ") and "a bead of 2 mm at 0.3 m/s" in said
+
+
+def test_none_and_unknown_have_one_too():
+    assert say_remedy(find("none", [(("none",), 0.9)]), []) == "Nothing needs to be mended."
+    assert "experiment" in say_remedy(find("unknown", [(("unknown",), 0.9)]), [])
+    assert "model.toml" in say_remedy(find("unknown", [(("unknown",), 0.9)], learned=object()), [])
