@@ -29,6 +29,9 @@ _PLACES = {
     "calibrate": "api",
     "diagnose": "api",
     "tabulate": "api",
+    "write_report": "api",
+    "load": "results",
+    "example": "examples",
     "LabsimError": "errors",
     "Material": "records",
     "Projectile": "records",
@@ -39,7 +42,7 @@ _PLACES = {
 
 __all__ = [
     "Camera", "DropSetting", "LabsimError", "Material", "Projectile", "RunStore", "__version__", "calibrate", "diagnose",
-    "read_campaign", "reduce_scan", "simulate", "tabulate", "track",
+    "example", "load", "read_campaign", "reduce_scan", "simulate", "tabulate", "track", "write_report",
 ]  # fmt: skip
 
 
@@ -52,4 +55,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_PLACES})
+    return sorted(__all__)  # what a script needs, and nothing that this file imports

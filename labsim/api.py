@@ -164,6 +164,45 @@ def diagnose(
     return diagnose_summary(calibrate_summary(read, opened, **settings), opened, **settings)
 
 
+def write_report(
+    found: Diagnosis | Calibration | SummaryDiagnosis | SummaryCalibration, folder: Path | str
+) -> Path:
+    """Write what ``labsim diagnose`` or ``labsim calibrate`` writes of a result: report, numbers, posterior and pictures.
+
+    Parameters
+    ----------
+    found : Diagnosis, Calibration, SummaryDiagnosis or SummaryCalibration
+        What ``labsim.diagnose`` or ``labsim.calibrate`` returned.
+    folder : Path or str
+        It is made where it is missing; ``labsim.load`` reads it again.
+
+    Returns
+    -------
+    Path
+        The folder. ``report.html`` in it is one file with all pictures (of published figures: of a diagnosis only).
+    """
+    from .cli.calibrate import write_calibration
+    from .cli.diagnose import write_diagnosis
+    from .cli.measured import write_measured_calibration, write_measured_diagnosis
+    from .diagnosis.campaign import Diagnosis
+    from .diagnosis.summary import SummaryDiagnosis
+    from .inference.calibrate import Calibration
+    from .results import SAID
+
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    if isinstance(found, Diagnosis):
+        lines = write_measured_diagnosis(found, folder)[1]
+    elif isinstance(found, Calibration):
+        lines = write_measured_calibration(found, folder)[1]
+    elif isinstance(found, SummaryDiagnosis):
+        lines = write_diagnosis(found, folder)[1]
+    else:
+        lines = write_calibration(found, folder)[1]
+    (folder / SAID).write_text(lines + "\n", encoding="utf-8")
+    return folder
+
+
 def tabulate(thing: Track | DecelerationCurve | CompressedVolume | DropRun) -> pd.DataFrame:
     """A pandas table, one line a frame, instant or threshold; its columns are those of the CSV files, with units.
 

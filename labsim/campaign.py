@@ -6,7 +6,7 @@ written; every mistake is a CampaignError that names file, key, value and remedy
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from .campaign_tables import (
     read_source,
 )
 from .errors import CampaignError, MeasurementError
+from .force import check_force, read_gauge
 from .own_keys import DUST, read_motion
 from .records import (
     STANDARD_GRAVITY,
@@ -99,16 +100,20 @@ def read_campaign(folder: Path | str) -> Campaign:
     )
 
 
-def read_drop(path: Path | str) -> Drop:
-    """Read one drop: its folder or its drop.toml. Raises CampaignError."""
+def read_drop(path: Path | str, *, given: Mapping[str, Mapping[str, Any]] | None = None) -> Drop:
+    """Read one drop: its folder or its drop.toml. given : tables of keys that stand over those of the file.
+
+    Raises CampaignError.
+    """
     file = find_toml(Path(path), "drop.toml")
     document = Document(file)
+    document.put(given or {})
     document.top()
     record_table = document.table("record")
-    kind = record_table.choice("kind", ("track", "video", "acceleration", "summary"))
+    kind = record_table.choice("kind", ("track", "video", "acceleration", "force", "summary"))
     campaign = file.resolve().parents[2] if len(file.resolve().parents) > 2 else None
-    projectile = read_projectile(document.table("projectile"), campaign)
     motion = read_motion(document.table("motion", required=False), campaign, file.parent)
+    projectile = read_projectile(document.table("projectile"), campaign, led=motion.kind != "free")
     drop = document.table("drop", required=kind != "summary")
     sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" else drop.number(
         "sequence", 0, 100000, whole=True
@@ -121,7 +126,7 @@ def read_drop(path: Path | str) -> Drop:
         required=kind in ("track", "video") and motion.kind == "free",
     )
     speed = drop.measured("impact_speed_m_s", 1e-3, 100.0, required=False) if kind != "summary" else None
-    camera, published, accelerometer = None, None, None
+    camera, published, accelerometer, gauge = None, None, None, None
     if kind == "summary":
         if document.has("camera"):
             raise CampaignError(file, "[camera]", 'does not belong to a record of kind "summary"; remove it')
@@ -137,6 +142,20 @@ def read_drop(path: Path | str) -> Drop:
                 )
         record = Record(kind="acceleration", path=_existing(record_table, file.parent, folder_allowed=False))
         accelerometer = read_accelerometer(record_table)
+    elif kind == "force":
+        for other in ("camera", "published"):
+            if document.has(other):
+                raise CampaignError(
+                    file, f"[{other}]", 'does not belong to a record of kind "force"; remove it'
+                )
+        if motion.kind == "free":
+            raise CampaignError(
+                file,
+                "motion.kind",
+                'is "free", but a force is recorded of a push; write kind = "pushed" and speed_m_s',
+            )
+        record = Record(kind="force", path=_existing(record_table, file.parent, folder_allowed=False))
+        gauge = read_gauge(record_table)
     else:
         if document.has("published"):
             raise CampaignError(
@@ -148,13 +167,18 @@ def read_drop(path: Path | str) -> Drop:
             kind=kind,  # type: ignore[arg-type]
             path=data,
             row_sigma=record_table.number("row_sigma_px", 1e-6, 50.0, default=None),
+            region=_read_region(record_table) if kind == "video" else None,
+            left_out=record_table.numbers("frames_left_out", 0, 1e9, whole=True) or (),
         )
+    position = _read_position(drop)
     source = read_source(document)
     document.close()
     if kind == "track":
         _check_track(record.path, camera)  # type: ignore[arg-type]
     if record.path is not None and accelerometer is not None:
         check_acceleration(record.path, accelerometer)
+    if record.path is not None and gauge is not None:
+        check_force(record.path, gauge, projectile.tip_radius)
     return Drop(
         name=file.parent.name,
         projectile=projectile,
@@ -167,7 +191,21 @@ def read_drop(path: Path | str) -> Drop:
         motion=motion,
         accelerometer=accelerometer,
         impact_speed=speed,
+        gauge=gauge,
+        position=position,
     )
+
+
+def _read_position(table: Table) -> tuple[float, float] | None:
+    """``position_m``: where a push was made, east and north."""
+    found = table.get("position_m", None)
+    if found is None:
+        return None
+    if not isinstance(found, list) or len(found) != 2:
+        raise table.wrong("position_m", f"{found!r} is not a place; write east and north in m as [3.2, 10.5]")
+    for value in found:
+        table.check_number("position_m", value, -1e8, 1e8)
+    return float(found[0]), float(found[1])
 
 
 def describe_campaign(campaign: Campaign) -> dict[str, Any]:
@@ -224,6 +262,16 @@ def _existing(table: Table, folder: Path, *, folder_allowed: bool) -> Path:
     if path.is_dir() and not any(path.iterdir()):
         raise table.wrong("file", f"{path} is an empty folder; put the frames there")
     return path
+
+
+def _read_region(table: Table) -> tuple[int, int, int, int] | None:
+    found = table.numbers("region_px", 0, 1e5, count=4, whole=True)
+    if found is None:
+        return None
+    left, top, right, bottom = found
+    if right <= left or bottom <= top:
+        raise table.wrong("region_px", f"{list(found)} has no area; write [left, top, right, bottom]")
+    return left, top, right, bottom
 
 
 def _check_track(path: Path, camera: Camera) -> None:

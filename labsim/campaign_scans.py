@@ -38,9 +38,7 @@ def read_scan(
         file = find_toml(path, "scan.toml")
         home, name = file.parent, file.resolve().parent.name
         document = Document(file)
-        for table_name, values in given.items():
-            stated = document.values.get(table_name, {})
-            document.values[table_name] = {**(stated if isinstance(stated, dict) else {}), **values}
+        document.put(given)
     document.top()
     projectile = read_bead(document.table("projectile"))
     drop = document.table("drop", required=speed_required)
@@ -65,6 +63,7 @@ def read_scan(
     bits = table.number("bits", 8, 16, whole=True)
     if bits not in (8, 16):
         raise table.wrong("bits", f"{bits} is not 8 or 16; write the depth of the slice images")
+    axis = table.numbers("axis_px", 0.0, 1e5, count=2)
     grey = document.table("calibration")
     calibration = GreyCalibration(
         grey_air=grey.number("grey_air", -70000.0, 70000.0),
@@ -73,7 +72,7 @@ def read_scan(
     )
     document.close()
     _check_slices(table, slices)
-    return Scan(name, projectile, speed, slices, voxel, first, bits, calibration)  # type: ignore[arg-type]
+    return Scan(name, projectile, speed, slices, voxel, first, bits, calibration, axis)  # type: ignore[arg-type]
 
 
 def read_scans(folder: Path | str) -> tuple[Sample, tuple[Scan, ...]]:

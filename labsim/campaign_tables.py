@@ -13,6 +13,7 @@ from .tables import Document, Table
 
 # densities between which a projectile is believed, kg/m^3: a hollow tube up to osmium
 LIGHTEST, HEAVIEST = 20.0, 23000.0
+STEEL = 7850.0  # kg/m^3, of a ball in place of a tip whose mass plays no part
 # key in [material] -> field of Material, and between what it is believed; all but p_m
 MATERIAL_KEYS = {
     "phi_1": ("phi_1", 0.0, 0.74),
@@ -33,8 +34,8 @@ def read_sample(table: Table) -> Sample:
         filling_factor=table.number("filling_factor", 0.01, 0.74),
         filling_factor_sigma=table.number("filling_factor_sigma", 0.0, 0.1),
         monomer_density=table.number("monomer_density_kg_m3", 100.0, 23000.0),
-        diameter=table.number("diameter_mm", 1.0, 1000.0, unit=1e-3),
-        depth=table.number("depth_mm", 0.5, 1000.0, unit=1e-3),
+        diameter=table.number("diameter_mm", 1.0, 1e6, unit=1e-3),
+        depth=table.number("depth_mm", 0.5, 1e5, unit=1e-3),
         gas_pressure=table.number("gas_pressure_Pa", 0.0, 1e6),
         scatter=table.number("scatter", 0.0, 1.0) if table.has("scatter") else None,
     )
@@ -86,9 +87,15 @@ def read_planar(table: Table) -> Planar:
     )
 
 
-def read_projectile(table: Table, folder: Path | None = None) -> Projectile:
-    """folder : of the campaign, whose ``tips/`` may hold the tip."""
+def read_projectile(table: Table, folder: Path | None = None, *, led: bool = False) -> Projectile:
+    """folder : of the campaign, whose ``tips/`` may hold the tip. led : by a driver, so that its mass may be left out."""
     sigma = table.sigma_key("mass_mg")
+    if led and not table.has("mass_mg"):
+        table.known.add("mass_mg")
+        tip, shape = read_tip(table, ("tip_radius_mm", "length_mm"), folder)
+        radius = table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3)
+        length = table.number("length_mm", 0.1, 1e5, unit=1e-3, default=0.0)
+        return Projectile(tip, radius, STEEL * 4 / 3 * math.pi * radius**3, length=length, shape=shape)
     tip, shape = read_tip(table, ("tip_radius_mm", "length_mm", "mass_mg", sigma), folder)
     projectile = Projectile(
         tip=tip,

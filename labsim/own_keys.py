@@ -43,11 +43,12 @@ def read_motion(table: Table, beside: Path | None = None, folder: Path = Path())
     kind = find_name(table, "kind", table.text("kind", "free"), "motions", beside)
     module = SHELF.find(kind)
     start = table.number("start_depth_mm", 0.0, 1000.0, unit=1e-3, default=0.0)
+    sigma = table.number("speed_sigma_m_s", 0.0, 100.0, default=0.0)
     path: tuple[tuple[float, float], ...] = ()
     if getattr(module, "TAKES_TABLE", False):
         path = _read_path(table, folder)
     values = read_own(table, f'kind = "{Path(kind).stem}"', module.PARAMETERS)
-    motion = Motion(kind, start, values, path)
+    motion = Motion(kind, start, values, path, sigma)
     try:
         from .sph.motions import make_path
 

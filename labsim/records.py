@@ -94,6 +94,7 @@ class Motion:
     start_depth: float = 0.0  # m, of the tip in the dust when it starts
     values: tuple[tuple[str, float], ...] = ()  # SI, its own numbers that are not at their defaults
     table: tuple[tuple[float, float], ...] = ()  # (time s, depth m), where the kind wants one
+    speed_sigma: float = 0.0  # m/s, of a push as it was measured
 
 
 @dataclass(frozen=True)
@@ -128,12 +129,34 @@ class Accelerometer:
 
 
 @dataclass(frozen=True)
-class Record:
-    """Where the record of a drop is: ``kind`` is "track", "video", "acceleration" or "summary"."""
+class Gauge:
+    """What logs a push. depth_column, column : of a table, "" where the format has its own; unit, depth_unit : SI of one of their
+    numbers; sigma (of a row), offset_sigma : SI, N of a force, else Pa; scale_sigma : relative; window : m, what is compared."""
 
-    kind: Literal["track", "video", "acceleration", "summary"]
+    depth_column: str
+    column: str
+    is_force: bool
+    depth_unit: float
+    unit: float
+    sigma: float
+    offset_sigma: float
+    scale_sigma: float
+    window: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Record:
+    """Where the record of a drop is: ``kind`` is "track", "video", "acceleration", "force" or "summary".
+
+    region : left, top, right, bottom (px, the last column and row included) of the part of the picture that is searched, None for
+    all of it. left_out : frame numbers whose rows are not used.
+    """
+
+    kind: Literal["track", "video", "acceleration", "force", "summary"]
     path: Path | None = None
     row_sigma: float | None = None  # px
+    region: tuple[int, int, int, int] | None = None
+    left_out: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -160,6 +183,8 @@ class Drop:
     motion: Motion = Motion()
     accelerometer: Accelerometer | None = None
     impact_speed: Measured | None = None  # m/s, where it was measured beside the record
+    gauge: Gauge | None = None
+    position: tuple[float, float] | None = None  # m, east and north, where the place of a push matters
 
 
 @dataclass(frozen=True)
@@ -183,6 +208,9 @@ class Scan:
     first_slice: Literal["top", "bottom"]
     bits: int
     calibration: GreyCalibration
+    axis: tuple[float, float] | None = (
+        None  # px, column and row of the axis where it is stated; else the bead tells
+    )
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +131,20 @@ class Table:
                 )
         return f"{key}_sigma"
 
+    def numbers(
+        self, key: str, low: float, high: float, *, count: int | None = None, whole: bool = False
+    ) -> tuple[Any, ...] | None:
+        """A list of numbers between low and high, ``count`` of them where that is given; None without the key."""
+        value = self.get(key, None)
+        if key not in self.values:
+            return None
+        if not isinstance(value, list) or (count is not None and len(value) != count):
+            many = "numbers" if count is None else f"{count} numbers"
+            raise self.wrong(key, f"{value!r} is not a list of {many}; write them in [ ]")
+        for each in value:
+            self.check_number(key, each, low, high, whole=whole)
+        return tuple(int(each) if whole else float(each) for each in value)
+
     def text(self, key: str, default: Any = _REQUIRED) -> Any:
         value = self.get(key, default)
         if key in self.values and (
@@ -174,6 +189,13 @@ class Document:
         document = cls.__new__(cls)
         document.file, document.values, document.asked, document.tables = where, values, set(), []
         return document
+
+    def put(self, given: Mapping[str, Mapping[str, Any]]) -> None:
+        """Tables of keys that stand over those of the file; a key whose value is None is taken out."""
+        for name, values in given.items():
+            stated = self.values.get(name, {})
+            both = {**(stated if isinstance(stated, dict) else {}), **values}
+            self.values[name] = {key: value for key, value in both.items() if value is not None}
 
     def top(self) -> Table:
         """The keys that stand above the first table."""

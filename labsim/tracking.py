@@ -30,7 +30,7 @@ class Request:
     """What is known about one drop; None where the file or the picture must tell.
 
     points : name and content of a table; frames : of a video; scale_source : "stated", "ruler", "rod diameter" or "table";
-    scales : every pixel size (m) that was measured, by its source.
+    scales : every pixel size (m) that was measured, by its source. region, left_out : as in ``Record``.
     """
 
     source: Path
@@ -44,6 +44,8 @@ class Request:
     points: tuple[str, Points] | None = None
     frames: video.Frames | None = None
     scale_source: str | None = None
+    region: tuple[int, int, int, int] | None = None
+    left_out: tuple[int, ...] = ()
     scales: dict[str, Measured] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
@@ -117,8 +119,13 @@ def read_request(
     )
     if drop is not None:
         if drop.camera is None or drop.record.path is None:
+            holds = (
+                "published figures hold" if drop.record.kind == "summary" else "the record of a sensor holds"
+            )
             raise MeasurementError(
-                drop.name, "record.kind", "is summary: published figures hold nothing to track"
+                drop.name,
+                "record.kind",
+                f"is {drop.record.kind}: {holds} nothing to track; labsim check says what there is",
             )
         camera = drop.camera
         request.source = drop.record.path
@@ -127,6 +134,7 @@ def read_request(
         request.surface = surface or Measured(camera.surface_row, camera.surface_row_sigma)
         request.row_sigma = row_sigma or drop.record.row_sigma
         request.scale_source = "stated"
+        request.region, request.left_out = drop.record.region, drop.record.left_out
     if not request.source.exists():
         raise MeasurementError(
             request.source, "DROP", "does not exist; name a drop folder, a video or a track.csv"
@@ -146,6 +154,8 @@ def read_request(
         request.frames = video.open_frames(request.source).turned(rotate)
         if frames is not None:
             request.frames = request.frames.section(*frames)
+            there = set(request.frames.numbers.tolist())
+            request.left_out = tuple(number for number in request.left_out if number in there)
     if missing := request.list_missing():
         are = "is not in the file; state it" if len(missing) == 1 else "are not in the file; state them all"
         raise MeasurementError(request.source, ", ".join(missing), are)
@@ -172,6 +182,8 @@ def measure(request: Request, progress: Progress | None = None) -> Tracked:
             request.frames,
             frame_rate=request.frame_rate,
             surface_row=request.surface.value if request.surface else None,
+            region=request.region,
+            left_out=request.left_out,
             progress=progress,
         )
         found = seen.track
@@ -203,7 +215,10 @@ def _read_table(request: Request) -> Track:
         request.surface.sigma,
     )
     return video.make_track(
-        request.source, place_points(request.source, name, points, camera), request.row_sigma
+        request.source,
+        place_points(request.source, name, points, camera),
+        request.row_sigma,
+        request.left_out,
     )
 
 

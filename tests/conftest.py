@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable
 from typing import Any
 
@@ -34,6 +35,22 @@ def shared_store() -> str:
     from labsim.inference.runs import default_store
 
     return str(default_store())
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Headless Chromium of the system, driven by Playwright; the test is skipped where either is missing."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    named = os.environ.get("LABSIM_CHROMIUM")
+    chromium = (
+        named or shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    )
+    if chromium is None:
+        pytest.skip("no Chromium here (Debian: apt install chromium; or name it in LABSIM_CHROMIUM)")
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield opened
+        opened.close()
 
 
 @pytest.fixture

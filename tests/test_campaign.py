@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from campaign_files import CAMPAIGN, DROP, SCAN
 
 from labsim.campaign import describe_campaign, read_campaign, read_drop, read_scan
 from labsim.cli import main
-from labsim.errors import CampaignError
+from labsim.errors import CampaignError, MeasurementError
+from labsim.inference.observe import read_observed_track
 from labsim.records import PublishedScan, Scan
 
 SEED = Path(__file__).parent.parent / "data" / "guettler2009"
@@ -49,6 +51,21 @@ def test_a_campaign_is_read_in_si(campaign: Path) -> None:
     assert scan.voxel == pytest.approx(40e-6) and scan.speed.value == 0.777
     assert isinstance(read_scan(campaign / "ct/C01"), Scan)
     assert read_drop(campaign / "drops/D01") == drop
+
+
+def test_frames_that_are_left_out_of_a_track(campaign: Path) -> None:
+    file = campaign / D
+    file.write_text(file.read_text().replace("[record]", "[record]\nframes_left_out = [30, 31]"))
+    drop = read_drop(file)
+    assert drop.record.left_out == (30, 31)
+    track = read_observed_track(drop)
+    assert track.frame[~track.valid].tolist() == [30, 31]
+    assert read_drop(file, given={"record": {"frames_left_out": None}}).record.left_out == ()
+    file.write_text(file.read_text().replace("[30, 31]", "[40]"))
+    with pytest.raises(
+        MeasurementError, match=r"frames_left_out: 40 is no frame of the record; its frames are 0 to 39"
+    ):
+        read_observed_track(read_drop(file))
 
 
 def test_scatter_of_samples_is_optional(campaign: Path) -> None:
@@ -101,6 +118,10 @@ def _remove(file: str):  # type: ignore[no-untyped-def]
     return change
 
 
+def _set_video(line: str) -> Callable[[Path], None]:
+    return _replace(D, 'kind = "track"', f'kind = "video"\n{line}')
+
+
 C, D, S, T = "campaign.toml", "drops/D01/drop.toml", "ct/C01/scan.toml", "drops/D01/track.csv"
 SUMMARY = DROP.split("[camera]")[0] + '[record]\nkind = "summary"\n[published]\npenetration_depth_mm = 0.9\n'
 MISTAKES = {
@@ -146,6 +167,12 @@ MISTAKES = {
     "track text": (_replace(T, "\n3,256", "\n3,abc"), [T, "tip_row_px", "line 5", "abc"]),
     "track unsorted": (_replace(T, "\n3,256", "\n1,256"), [T, "frame", "line 5"]),
     "track misses surface": (_replace(D, "= 296.15", "= 400"), [T, "never reaches the surface", "400"]),
+    "region of three": (_replace(D, "[record]", "[record]\nregion_px = [1, 2, 3]"), [D, "record.region_px", "not a key"]),
+    "region of a video": (_set_video("region_px = [1, 2, 3]"), [D, "record.region_px", "[1, 2, 3]", "4 numbers"]),
+    "region turned over": (_set_video("region_px = [9, 2, 3, 8]"), [D, "record.region_px", "[9, 2, 3, 8]", "no area"]),
+    "frames left out": (_replace(D, "[record]", "[record]\nframes_left_out = [1.5]"), [D, "frames_left_out", "1.5", "whole"]),
+    "one frame left out": (_replace(D, "[record]", "[record]\nframes_left_out = 3"), [D, "frames_left_out", "3", "list"]),
+    "axis of one number": (_replace(S, "[scan]", "[scan]\naxis_px = [50.0]"), [S, "scan.axis_px", "[50.0]", "2 numbers"]),
     "published with track": (lambda f: (f / D).write_text(DROP + "[published]\n"), [D, "[published]", "summary"]),
     "summary with camera": (_replace(D, '"track"', '"summary"'), [D, "[camera]", "remove"]),
     "summary without sigma": (lambda f: (f / D).write_text(SUMMARY), [D, "penetration_depth_sigma_mm", "missing"]),

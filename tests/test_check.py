@@ -117,6 +117,14 @@ def test_a_picture_in_the_middle_that_cannot_be_read_is_bad_input(
     for number in range(12):
         tifffile.imwrite(drop.parent / f"fall/{number:03d}.tif", np.full((8, 8), number, np.uint8))
     assert "video of 12 frames" in check(campaign, capsys)["text"]
+    written = drop.read_text()
+    for line, said in (
+        ("region_px = [0, 0, 8, 7]", "[0, 0, 8, 7] is not inside the picture; columns go to 7, rows to 7"),
+        ("frames_left_out = [12]", "12 is no frame of the record; its frames are 0 to 11"),
+    ):
+        drop.write_text(written.replace("[record]", f"[record]\n{line}"))
+        assert said in check(campaign, capsys, status=2)["error"]
+    drop.write_text(written)
     (drop.parent / "fall/007.tif").write_bytes(b"II*\0")
     assert "007.tif" in check(campaign, capsys, status=2)["error"]
 

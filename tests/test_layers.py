@@ -10,22 +10,33 @@ import labsim
 ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
-    {"text_files", "extensions"},
+    {"text_files", "extensions", "references", "examples"},
     {"tables", "tiff_pages", "tracks"},
     {"video", "ct", "sph"},  # siblings that never import each other
-    {"own_keys"},
-    {"campaign_tables", "repeated_records", "acceleration"},
+    {"own_keys", "calibrated"},
+    {"campaign_tables", "repeated_records", "acceleration", "force"},
     {"campaign_scans", "campaign_strength"},
     {"campaign"},
     {"effects", "tracking"},
     {"inference"},
     {"diagnosis", "inspection"},
     {"report"},
-    {"api", "cli"},
+    {"view", "results"},
+    {"cli"},
+    {"api"},
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
-HOME = {"matplotlib": "report", "corner": "report", "cv2": "video", "skimage": "ct", "emcee": "inference"}
+HOME = {
+    "matplotlib": "report",
+    "corner": "report",
+    "cv2": "video",
+    "skimage": "ct",
+    "emcee": "inference",
+    "starlette": "view",
+    "uvicorn": "view",
+    "tomlkit": "view",
+}
 
 
 def room_of(path: Path) -> str:

@@ -34,6 +34,9 @@ NOT_COMMANDS = {"options", "measured"}  # shared by commands
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 for _name in THREADS:  # before numpy: the same sums on every machine, and no threads that fight the workers
     os.environ.setdefault(_name, "1")
+os.environ.setdefault(
+    "MPLBACKEND", "Agg"
+)  # commands draw into files; a notebook keeps its own way to show a picture
 
 STOPPED = 130  # what shells say of a command that was interrupted
 TERMINATED = 143  # and of one that was asked to end: 128 and the signal's number, 15
@@ -69,14 +72,11 @@ class CommandFolder(typer.core.TyperGroup):
                 ]
             )
 
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        return ["[--version] [--help]", *super().collect_usage_pieces(ctx)[1:]]
+
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        for parameter in self.get_params(ctx):
-            if isinstance(parameter, typer.core.TyperOption) and parameter.name in (
-                "show_completion",
-                "install_completion",
-            ):
-                parameter.hidden = True  # works as ever; the page fits a screen
-        super().format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)  # the options stand in the first line; the page fits a screen
 
     def list_commands(self, ctx: object) -> list[str]:
         return [name.rstrip("_").replace("_", "-") for name in list_command_files()]

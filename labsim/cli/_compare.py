@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from ..errors import LabsimError
+from ..results import SAID
 from ..text_files import load_json, load_toml
 from ._provenance import KEY
 
@@ -74,7 +75,7 @@ def _list(folder: Path) -> set[str]:
     return {
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
-        if path.is_file() and not path.name.startswith(".")
+        if path.is_file() and not path.name.startswith(".") and path.name != SAID  # words over these numbers
     }
 
 

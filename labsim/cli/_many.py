@@ -104,7 +104,7 @@ def finish_many(
         + f"; written to {options.shorten_path(file.parent)}"
     )
     options.write_json(file, summary)
-    options.finish(summary, "\n".join(lines), as_json=as_json, quiet=quiet)
+    options.finish(summary, "\n".join(lines), as_json=as_json, quiet=quiet, folder=file.parent)
     if summary["failed"]:
         name, text = next(iter(summary["failed"].items()))
         total = len(summary["failed"]) + len(summary["items"])

@@ -19,6 +19,7 @@ from ..effects import (
     read_model,
     reference_campaign,
 )
+from ..effects.model import apply_material
 from ..effects.terms import apply_law
 from ..errors import CampaignError, LabsimError
 from ..inference.planar import planar_setting
@@ -62,7 +63,7 @@ def make_setting(asked: Asked) -> tuple[DropSetting, list[str]]:
     model = read_model(asked.model, known) if asked.model is not None else None
     material, phi, density, gravity = _dust(read)
     if model is not None:
-        material = material.replace(p_m=model.p_m, **dict(model.material))
+        material = apply_material(material, model)
     if asked.p_m_pa is not None:
         material = material.replace(p_m=_between("--p-m-Pa", asked.p_m_pa, 1.0, 1e8))
     groups = _group(asked.settings)

@@ -47,7 +47,7 @@ def calibrate(
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:
-    """Find p_m from a campaign: posterior.nc, calibration.json, corner.png, fit.png."""
+    """Find p_m from a campaign: posterior.nc, calibration.json, fit.png, and corner.png of several parameters."""
     read = read_campaign(campaign)
     tracks = has_tracks(read)
     if tracks:
@@ -74,7 +74,11 @@ def calibrate(
             found = calibrate_figures(read, RunStore(store), use, planar_correction, bulk_modulus, settings)
             summary, lines = write_calibration(found, folder)
     options.finish(
-        summary, f"{lines}\n\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+        summary,
+        f"{lines}\n\nwritten to {options.shorten_path(folder)}",
+        as_json=as_json,
+        quiet=quiet,
+        folder=folder,
     )
 
 

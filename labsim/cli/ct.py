@@ -114,6 +114,7 @@ def ct(
         f"{lines}\nwritten to {options.shorten_path(target)}",
         as_json=as_json,
         quiet=quiet,
+        folder=target,
     )
 
 

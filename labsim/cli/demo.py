@@ -7,11 +7,9 @@ from typing import Annotated
 
 import typer
 
-import labsim
-
 from ..campaign import describe_campaign, read_campaign
 from ..diagnosis.summary import diagnose_summary
-from ..errors import CampaignError
+from ..examples import example
 from ..inference.runs import RunStore
 from ..inference.summary import calibrate_summary
 from . import options
@@ -30,7 +28,7 @@ def demo(
     as_json: options.AsJson = False,
 ) -> None:
     """Check, calibrate and diagnose the published drops of Güttler et al. (2009); minutes once, seconds again."""
-    campaign = read_campaign(find_data("guettler2009"))
+    campaign = read_campaign(example("guettler2009"))
     folder = options.make_output_folder(out or Path("labsim-demo"), campaign.folder, "demo")
     opened = RunStore(store)
     if not (quiet or as_json):
@@ -52,15 +50,5 @@ def demo(
         f"{calibration_lines(calibration)}\n\n{lines}\n\n{counted}; written to {options.shorten_path(folder)}:\n{made}",
         as_json=as_json,
         quiet=quiet,
-    )
-
-
-def find_data(name: str) -> Path:
-    """A campaign that ships with labsim: inside the installed package, or beside it in a checkout."""
-    package = Path(labsim.__file__).parent
-    for folder in (package / "data" / name, package.parent / "data" / name):
-        if (folder / "campaign.toml").is_file():
-            return folder
-    raise CampaignError(
-        package / "data" / name, "", "is missing from this installation; install labsim again"
+        folder=folder,
     )

@@ -50,7 +50,11 @@ def diagnose(
             )
             summary, lines = write_diagnosis(found, folder)
     options.finish(
-        summary, f"{lines}\n\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+        summary,
+        f"{lines}\n\nwritten to {options.shorten_path(folder)}",
+        as_json=as_json,
+        quiet=quiet,
+        folder=folder,
     )
 
 

@@ -27,7 +27,7 @@ def has_tracks(campaign: Campaign) -> bool:
 def calibrate_measured(
     campaign: Campaign, folder: Path, store: RunStore, parameters: tuple[str, ...], settings: dict[str, Any]
 ) -> tuple[dict, str]:
-    """posterior.nc, calibration.json, corner.png, fit.png; the summary and the lines for people."""
+    """posterior.nc, calibration.json, fit.png, posterior.png; the summary and the lines for people."""
     found = calibrate(campaign, ("p_m", *parameters), store=store, backend=folder / "chain.h5", **settings)
     return write_measured_calibration(found, folder)
 
@@ -38,6 +38,7 @@ def write_measured_calibration(found: Calibration, folder: Path) -> tuple[dict, 
     from ..report.campaign_tables import (
         campaign_calibration_lines,
         campaign_calibration_summary,
+        is_pushed,
         state_numerical_error,
     )
 
@@ -45,6 +46,11 @@ def write_measured_calibration(found: Calibration, folder: Path) -> tuple[dict, 
     options.write_json(folder / "calibration.json", summary)
     (folder / "posterior.nc").unlink(missing_ok=True)
     found.posterior.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
+    if is_pushed(found.bench):
+        from ..report.push_page import write_push_calibration
+
+        write_push_calibration(found, folder)
+        return summary, campaign_calibration_lines(found)
     figures.draw_posterior(found.posterior, folder / "corner.png")
     views, maps = _draw_fits(found, [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)], folder)
     (folder / "drops.png").rename(folder / "fit.png")
@@ -63,7 +69,12 @@ def diagnose_measured(
 def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]:
     from ..report import campaign_figures as figures
     from ..report.campaign_page import write_campaign_page
-    from ..report.campaign_tables import campaign_diagnosis_lines, campaign_diagnosis_summary, extended_model
+    from ..report.campaign_tables import (
+        campaign_diagnosis_lines,
+        campaign_diagnosis_summary,
+        extended_model,
+        is_pushed,
+    )
     from ..report.law_figures import draw_laws
 
     probabilities = dict(found.verdict.probabilities)
@@ -73,6 +84,11 @@ def write_measured_diagnosis(found: Diagnosis, folder: Path) -> tuple[dict, str]
     write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
     (folder / "posterior.nc").unlink(missing_ok=True)
     found.posterior_extended.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
+    if is_pushed(found.bench):
+        from ..report.push_page import write_push_diagnosis
+
+        write_push_diagnosis(found, summary, suggestions, folder)
+        return summary, campaign_diagnosis_lines(found, suggestions)
     fits = [("nominal", found.nominal)]
     posteriors = [("nominal", found.posterior_nominal)]
     if found.best is not found.nominal:

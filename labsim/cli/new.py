@@ -73,6 +73,8 @@ surface_row_sigma_px = 0.2          # how well that row is known
 kind = "track"                      # "track": a table; "video": a file or a folder of images; "summary": published figures
 file = "track.csv"                  # beside this file; a track has the columns frame,tip_row_px, one row a frame
 row_sigma_px = 0.1                  # optional: standard error of a row
+# frames_left_out = [118, 119]        # optional: numbers of frames whose rows are not used
+# region_px = [20, 0, 110, 380]       # optional, of a video: left, top, right, bottom of where the projectile is looked for
 
 # [record]                          # instead: an accelerometer on the projectile; then without [camera]
 # kind = "acceleration"
@@ -86,6 +88,23 @@ row_sigma_px = 0.1                  # optional: standard error of a row
 # scale_sigma = 0.01                  # how well the scale is known, relative
 # range = 50.0                        # optional: largest reading
 # [drop] then also takes impact_speed_m_s and impact_speed_sigma_m_s, and height_mm is optional
+
+# [record]                          # instead: a tip pushed into the ground with a gauge; then without [camera] and height_mm
+# kind = "force"
+# file = "push.csv"                   # beside this file; a heading, then one row a depth; a .cpt sounding needs no column keys
+# depth_column = "depth_mm"           # of the tip below the surface
+# force_column = "force_N"            # against the motion positive; or pressure_column, on the tip's section
+# depth_unit = "mm"                   # or "cm", "m"
+# force_unit = "N"                    # or "mN", "kN"; of a pressure "Pa", "kPa", "MPa"
+# sigma = 0.05                        # noise of a row, in force_unit
+# offset_sigma = 0.1                  # optional: how well the zero is known
+# scale_sigma = 0.01                  # optional: how well the scale is known, relative
+# window_mm = [60.0, 300.0]           # optional: the depths that are compared
+# [motion]                            # what a push needs beside it
+# kind = "pushed"
+# speed_m_s = 0.02
+# speed_sigma_m_s = 0.001             # optional: how well the speed is known
+# [drop] then also takes position_m = [3.2, 10.5], where it was made: east and north
 
 # [published]                       # only with kind = "summary", which has no [camera]; at least depth or stopping time
 # penetration_depth_mm = 0.85
@@ -111,6 +130,7 @@ slices = "slices"                   # folder of slices (TIFF, PNG, BMP) in the o
 voxel_um = 40.0                     # edge of a voxel
 first_slice = "top"                 # or "bottom": where the first file lies
 bits = 8                            # of the images, 8 or 16
+# axis_px = [52.5, 50.0]            # optional: column and row of the axis, where the middle of the bead is not to be taken
 
 [calibration]                       # grey level = grey_air + grey_per_density * density
 grey_air = 12.0                     # of empty space

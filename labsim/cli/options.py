@@ -16,6 +16,7 @@ from typing import Annotated, Any, Protocol
 import typer
 
 from ..errors import LabsimError
+from ..results import SAID
 from . import _provenance
 
 Out = Annotated[
@@ -125,8 +126,15 @@ def shorten_path(path: Path) -> str:
     return str(path.relative_to(here) if here in path.parents else path)
 
 
-def finish(summary: dict[str, Any], lines: str, *, as_json: bool, quiet: bool) -> None:
-    """Last words of a command: JSON where asked for, otherwise the lines a person reads."""
+def finish(
+    summary: dict[str, Any], lines: str, *, as_json: bool, quiet: bool, folder: Path | None = None
+) -> None:
+    """Last words of a command: JSON where asked for, otherwise the lines a person reads.
+
+    folder : where the lines are kept as summary.txt, which ``labsim.load`` shows again.
+    """
+    if folder is not None:
+        (folder / SAID).write_text(lines + "\n", encoding="utf-8")
     if as_json:
         typer.echo(json.dumps(_finite(summary), ensure_ascii=False, allow_nan=False))
     elif not quiet:

@@ -122,7 +122,11 @@ def simulate(
         draw_movie(min(runs, key=lambda each: each.setting.spacing), folder / "run.mp4")
     lines = "\n".join([lines, *unseen])
     options.finish(
-        summary, f"{lines}\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+        summary,
+        f"{lines}\nwritten to {options.shorten_path(folder)}",
+        as_json=as_json,
+        quiet=quiet,
+        folder=folder,
     )
 
 

@@ -79,7 +79,11 @@ def strength(
     options.write_json(folder / "strength.json", summary)
     text = "\n".join([*lines, *(f"  warning: {each}" for each in warnings)])
     options.finish(
-        summary, f"{text}\n\nwritten to {options.shorten_path(folder)}", as_json=as_json, quiet=quiet
+        summary,
+        f"{text}\n\nwritten to {options.shorten_path(folder)}",
+        as_json=as_json,
+        quiet=quiet,
+        folder=folder,
     )
 
 

@@ -132,7 +132,7 @@ def track(
         except MeasurementError as trouble:
             more = f"; {folder / SEEN} shows what was seen" if (folder / SEEN).is_file() else ""
             raise MeasurementError(trouble.where, trouble.key, trouble.message + more) from None
-    options.finish(summary, lines, as_json=as_json, quiet=quiet)
+    options.finish(summary, lines, as_json=as_json, quiet=quiet, folder=folder)
 
 
 def track_one(

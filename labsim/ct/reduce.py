@@ -28,6 +28,7 @@ STRONG_CUP = 0.15  # share of the dust's level
 STRONG_CUP_WORDS = (
     ", so much that the level about the bead is only as sure as its shape; correct it in the reconstruction"
 )
+AXIS_APART = 1.0  # voxels between a stated axis and the bead's middle, beyond which it is said
 RINGS_SEEN = 0.3  # share of the slices that must show rings before any are taken out
 
 
@@ -110,7 +111,7 @@ def reduce_scan(
             f"the bead's edge is blurred over {blur:.1f} voxels; {guard:.0f} voxels about the bead are left out"
         )
     report(1, 4, "surface")
-    x, y, k_bead = bead.centre
+    x, y, k_bead = _place_axis(stack, scan, bead, warnings)
     surface = find_surface(stack, (x, y), k_bead, bead.stated_radius)
     breaks: list[str] = []
     if scan.projectile.tip == "sphere":
@@ -253,6 +254,26 @@ def reduce_scan(
         tilt_followed=bool(followed), cupping=cupping, ring_rms=ring_rms, masked=masked,
         facts={**stack.facts, "slices": stack.count, "shape": list(stack.shape), "cell": cell, "guard": guard},
     )  # fmt: skip
+
+
+def _place_axis(stack: SliceStack, scan: Scan, bead: Bead, warnings: list[str]) -> tuple[float, float, float]:
+    """Column and row of the axis of the mean, and the slice of the bead's centre. The bead's voxels are left out where they are
+    found, wherever the axis is stated."""
+    x, y, k = bead.centre
+    if scan.axis is None:
+        return x, y, k
+    ny, nx = stack.shape
+    if not (0 < scan.axis[0] < nx - 1 and 0 < scan.axis[1] < ny - 1):
+        raise MeasurementError(
+            scan.slices, "scan.axis_px",
+            f"[{scan.axis[0]:g}, {scan.axis[1]:g}] is not inside the slices, which have {nx} columns and {ny} rows",
+        )  # fmt: skip
+    away = float(np.hypot(scan.axis[0] - x, scan.axis[1] - y))
+    if away > AXIS_APART:
+        warnings.append(
+            f"the axis is stated {away:.1f} voxels from the middle of the bead, which lies at ({x:.2f}, {y:.2f})"
+        )
+    return *scan.axis, k
 
 
 def mask_near_bead(

@@ -110,6 +110,11 @@ class Diagnosis(Judgement):
     warnings: tuple[str, ...]
     doubts: int = 0  # how many of the warnings, the first ones, are about p_m itself: nobody should read it without them
 
+    def __repr__(self) -> str:
+        causes, probability = self.verdict.probabilities[0]
+        said = f"{self.verdict.word}, {' + '.join(causes)} with probability {probability:.3g}"
+        return f"<Diagnosis of {self.campaign.name}: {said}>"
+
 
 def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgement:
     """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do."""
@@ -131,7 +136,9 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgemen
     predicted = 1.0
     if p_value < REJECTED and rivals:
         predicted = check_prediction(bench, leading, np.random.default_rng(seed))
-    if is_wanted(p_value, rivals, unknown.evidence, predicted):
+    if not any(family.pushed for family in bench.families) and is_wanted(
+        p_value, rivals, unknown.evidence, predicted
+    ):  # the laws without a name are those of drops
         unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
     verdict = judge(
         nominal,
@@ -246,12 +253,10 @@ def diagnose_campaign(
         )
     if found.verdict.word == "unknown":
         warnings.append(
-            f"p_m is not measured while the cause is unknown: {np.median(posterior.samples('p_m_Pa')):.4g} Pa without, "
-            f"{np.median(extended.samples('p_m_Pa')):.4g} Pa with the nearest listed cause; neither's interval holds"
+            f"p_m is not measured while the cause is unknown: {np.median(posterior.calibrated):.4g} Pa without, "
+            f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"
         )
-    sampled = {
-        fit.hypothesis: chain.samples("p_m_Pa") for fit, chain in ((nominal, posterior), (best, extended))
-    }
+    sampled = {fit.hypothesis: chain.calibrated for fit, chain in ((nominal, posterior), (best, extended))}
     averaged = average_p_m(
         found.verdict, nominal, found.rivals, campaign.p_m_range, sampled=sampled, seed=seed
     )

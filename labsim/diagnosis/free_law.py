@@ -21,6 +21,7 @@ from ..inference.blocks import Block, solve_globals
 from ..inference.evidence import log_share_inside
 from ..inference.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
 from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
+from ..inference.run_parts import Push
 from ..inference.steps import move_nuisances
 from ..inference.tangents import linearise_at
 from ..inference.workbench import Workbench
@@ -116,6 +117,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         run.setting: run.penetration_depth
         for number in range(len(bench.families))
         for run in bench.grid.stopped_runs("", index, None, number) or ()
+        if not isinstance(run, Push)
     }
     hats = {name: hat for law in laws for name, hat in make_hats(law, deepest).items()}
     # shares tables, runs and what they hold

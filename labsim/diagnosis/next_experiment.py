@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..calibrated import read_value
 from ..inference.curves import FRACTIONS
 from ..inference.fitting import Fit
 from ..inference.observe import ObservedDrop
@@ -19,6 +20,10 @@ from ..inference.workbench import Workbench
 from ..records import STANDARD_GRAVITY, FloatArray
 
 USUAL_SIGMA = 2e-6  # m, of a camera where no drop had one
+SEEN_BY_SPEED = (
+    0.01  # of ln resistance, between the slowest and the fastest push: less is no cause that speed shows
+)
+DECIDED = 4.0  # standard deviations between two predictions that are told apart
 WORTHWHILE = 0.01  # bits below which an experiment is not suggested
 SMALLEST = 0.005  # probability below which a hypothesis is left out
 POINTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])  # fractions of the stop that are compared
@@ -35,13 +40,18 @@ def suggest(
 ) -> list[Suggestion]:
     """Best first. fits: hypotheses with a prediction (the nominal one has the empty name)."""
     standing = [fit for fit in fits if probabilities.get(fit.hypothesis or ("none",), 0.0) > SMALLEST]
+    found = [
+        each
+        for number, family in enumerate(bench.families)
+        if family.pushed
+        for each in _suggest_pushes(bench, fits, probabilities, number)
+    ]
     if len(standing) < 2:
-        return []
+        return found
     weight = np.array([probabilities[fit.hypothesis or ("none",)] for fit in standing])
     weight /= weight.sum()
-    found = []
     for number, family in enumerate(bench.families):
-        if family.is_scan:
+        if family.is_scan or family.pushed:
             continue
         for speed in family.speeds[1:]:
             means = np.stack([_predict(bench, fit, number, speed) for fit in standing])
@@ -57,6 +67,63 @@ def suggest(
             )
     worth = [each for each in found if each.information_bits >= WORTHWHILE]
     return sorted(worth, key=lambda each: -each.information_bits)[:5]
+
+
+def _suggest_pushes(
+    bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ...], float], number: int
+) -> list[Suggestion]:
+    """As many pushes at the slowest and at the fastest speed, near each other, as tell the first cause from the most
+    probable other that speed shows by DECIDED standard deviations.
+
+    What is calibrated and the profile of the ground fall out of the ratio of the two; the scatter of samples stays. A cause that
+    was not fitted is taken as large as its prior expects.
+    """
+    pushes = sorted(
+        (dict(drop.motion.values)["speed"], drop.name) for drop in bench.campaign.drops if drop.gauge
+    )
+    (slow, first), (fast, last) = pushes[0], pushes[-1]
+    if slow == fast:
+        return []
+    fitted = {fit.hypothesis: fit.values for fit in fits}
+    table, place = bench.tracks.features[number].table, next(iter(bench.places.values()))
+    ratios, weights, names_of = [], [], []
+    for hypothesis, probability in probabilities.items():
+        if probability < SMALLEST or hypothesis == ("unknown",):
+            continue
+        names = () if hypothesis == ("none",) else hypothesis
+        usual = {name: bench.effects[name].amplitudes[0].scale for name in names}
+        own = fitted.get(names, usual)
+        values = {name: own[name] if abs(own[name]) > 0.1 * usual[name] else usual[name] for name in names}
+        ends = []
+        for speed, push in ((slow, first), (fast, last)):
+            state = bench.state(bench.families[number], push)
+            changed = state
+            for name in names:
+                if bench.strength_only(name):
+                    changed = bench.effects[name].apply(changed, bench.at(name, values[name]), place)
+            shift = math.log(read_value(changed.material) / read_value(state.material))
+            ends.append(table.code(fits[0].log_p_m + shift, math.log(speed), values)[0])
+        ratios.append(ends[1] - ends[0])
+        names_of.append(hypothesis)
+        weights.append(probability)
+    if not ratios:
+        return []
+    apart = np.abs(np.array(ratios) - ratios[int(np.argmax(weights))])
+    likely = np.where(apart > SEEN_BY_SPEED, weights, 0.0)
+    if not likely.any():
+        return []
+    rival = int(np.argmax(likely))
+    count = max(1, math.ceil(2.0 * (DECIDED * bench.terms.scatter / apart[rival]) ** 2))
+    said = [" + ".join(names_of[k]) for k in (int(np.argmax(weights)), rival)]
+    spread = np.array([[2.0 * bench.terms.scatter**2 / count]])
+    bits = expected_information(np.array(ratios)[:, None], spread, np.array(weights) / sum(weights))
+    return [
+        Suggestion(
+            f"{count} more push{'es' * (count > 1)} at {1e3 * slow:g} mm/s and as many at {1e3 * fast:g} mm/s, near each other, "
+            f"to tell {said[0]} from {said[1]}",
+            round(bits, 3),
+        )
+    ]
 
 
 def expected_information(means: FloatArray, spread: FloatArray, weight: FloatArray) -> float:

@@ -191,7 +191,7 @@ def predict_calibrated(calibration: SummaryCalibration) -> list[Prediction]:
         if place not in calibration.emulators or drop.published is None:
             continue
         emulator = calibration.emulators[place]
-        outputs = emulator.predict(calibration.posterior.samples("p_m_Pa")[:, None])
+        outputs = emulator.predict(calibration.posterior.calibrated[:, None])
         for column, kind in enumerate(FIGURE_KINDS):
             if (found := published_figure(drop, kind)) is None:
                 continue

@@ -64,6 +64,9 @@ class SummaryDiagnosis:
     wall: float
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<SummaryDiagnosis of {self.calibration.campaign.name}: {self.verdict.word}, p = {self.p_value:.2g}>"
+
 
 def diagnose_summary(
     calibration: SummaryCalibration,
@@ -106,7 +109,7 @@ def diagnose_summary(
     for radius, drops in sorted(groups.items()):
         own = [run for run, at in zip(runs, place, strict=True) if at == ("size", radius)]
         sizes.append(Size(radius, drops, own, emulate_runs(own)))
-    p_m = np.clip(calibration.posterior.samples("p_m_Pa"), p_grid[0], p_grid[-1])
+    p_m = np.clip(calibration.posterior.calibrated, p_grid[0], p_grid[-1])
     rows, drop_rows, log_samples, diagonal = predict_sizes(calibration, sizes, p_m)
     scan_run = None
     for scan in scans:
@@ -148,7 +151,7 @@ def diagnose_summary(
 
 def _choose_p_m(calibration: SummaryCalibration) -> FloatArray:
     """Three values over the posterior, on a fixed grid."""
-    low, high = np.log(np.quantile(calibration.posterior.samples("p_m_Pa"), (0.01, 0.99)))
+    low, high = np.log(np.quantile(calibration.posterior.calibrated, (0.01, 0.99)))
     low = P_M_STEP * math.floor(low / P_M_STEP)
     high = P_M_STEP * math.ceil(high / P_M_STEP)
     return np.exp(np.round(np.linspace(low, high, 3) / P_M_STEP) * P_M_STEP)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..calibrated import show_parameter
 from ..inference.blocks import whiten_all
 from ..inference.fitting import Fit, with_probes
 from ..inference.workbench import Workbench
@@ -97,4 +98,8 @@ def find_combination(bench: Workbench, fit: Fit, untestable: list[Untestable]) -
     # about a null of one the amplitude is the ln of a factor
     amplitude = full if parameter.null == 0.0 else f"({full} - {parameter.null:g})"
     factor = f"{full}^{power:.2f}" if parameter.null == 1.0 else f"exp({power:.3g} * {amplitude})"
-    return Combination(f"p_m * {factor}", math.exp(fit.log_p_m), math.sqrt(fit.covariance[0, 0]))
+    return Combination(
+        f"{show_parameter(bench.campaign.material.law)[0]} * {factor}",
+        math.exp(fit.log_p_m),
+        math.sqrt(fit.covariance[0, 0]),
+    )

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..calibrated import read_value, set_value
 from ..errors import EffectError
 from ..records import (
     STANDARD_GRAVITY,
@@ -87,7 +88,7 @@ class Place:
 
     sequence_fraction: -0.5 for the first drop made, +0.5 for the last, 0 for scans. sample and nominal are what the
     campaign states; p_m stays in ``setting.material``. tip: of the stated projectile.
-    smallest_tip_radius: of the campaign's drops, m.
+    smallest_tip_radius: of the campaign's drops, m. position: east and north of the middle of all drops, m.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Place:
     nominal: Material
     tip: str = "hemisphere"
     smallest_tip_radius: float = 0.5e-3
+    position: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -229,16 +231,39 @@ class Effect:
         return ", ".join(parameter.name for parameter in self.parameters)
 
 
+def all_pushed(campaign: Campaign) -> bool:
+    """Whether nothing is dropped: a driver leads every projectile, whose mass and stop then mean nothing."""
+    return all(drop.motion.kind != "free" for drop in campaign.drops)
+
+
+def find_middle(campaign: Campaign) -> tuple[float, float]:
+    """Mean east and north (m) of the drops whose position is stated."""
+    stated = [drop.position for drop in campaign.drops if drop.position is not None]
+    east, north = np.mean(stated, axis=0) if stated else (0.0, 0.0)
+    return float(east), float(north)
+
+
 def list_places(campaign: Campaign) -> dict[str, Place]:
     """The place of every drop and scan of a campaign, by name."""
     numbers = [drop.sequence for drop in campaign.drops]
     first, last = min(numbers), max(numbers)
     smallest = min(drop.projectile.tip_radius for drop in campaign.drops)
     places = {}
+    middle = find_middle(campaign)
     for drop in campaign.drops:
         fraction = (drop.sequence - first) / (last - first) - 0.5 if last > first else 0.0
+        position = None
+        if drop.position is not None:
+            position = drop.position[0] - middle[0], drop.position[1] - middle[1]
         places[drop.name] = Place(
-            drop.name, fraction, False, campaign.sample, campaign.material, drop.projectile.tip, smallest
+            drop.name,
+            fraction,
+            False,
+            campaign.sample,
+            campaign.material,
+            drop.projectile.tip,
+            smallest,
+            position,
         )
     for scan in _list_scans(campaign):
         places[scan.name] = Place(
@@ -270,7 +295,7 @@ def _list_impacts(campaign: Campaign) -> list[tuple[Projectile, float]]:
 
 def _list_settings(campaign: Campaign, p_m: float) -> list[DropSetting]:
     """Every drop and scan as it is simulated in dust of one strength (Pa)."""
-    material = campaign.material.replace(p_m=p_m)
+    material = set_value(campaign.material, p_m)
     return [
         DropSetting(projectile.simulated, speed, material, geometry=campaign.geometry)
         for projectile, speed in _list_impacts(campaign)
@@ -279,7 +304,7 @@ def _list_settings(campaign: Campaign, p_m: float) -> list[DropSetting]:
 
 def deepest_expected(campaign: Campaign) -> float:
     """Depth (m) that the fastest and heaviest projectile is expected to reach in dust of the nominal strength."""
-    return max(setting.expected_depth for setting in _list_settings(campaign, campaign.material.p_m))
+    return max(setting.expected_depth for setting in _list_settings(campaign, read_value(campaign.material)))
 
 
 def deepest_dust(campaign: Campaign) -> float:
@@ -305,8 +330,10 @@ __all__ = [
     "Prior",
     "Uniform",
     "Values",
+    "all_pushed",
     "deepest_dust",
     "deepest_expected",
+    "find_middle",
     "list_places",
     "list_thrown",
 ]

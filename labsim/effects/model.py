@@ -13,6 +13,8 @@
     inertial_drag = 120.0
     force_of_depth = [[0.0, 0.0], [1.0, 80.0], [2.0, 0.0]]
 
+Of another law than the dust's, ``law = "von_mises"`` and what is calibrated of it (``cohesion_Pa``) stand under [material].
+
 Under [law] stand coefficients of terms (effects/terms/), and tables at knots: ``strength_of_filling_factor`` (filling factor,
 strength over what p_m gives minus one), ``force_of_depth`` (tip radii, Pa), ``force_of_speed`` (m/s, Pa).
 
@@ -30,10 +32,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..calibrated import find_limits, name_column, set_value
 from ..campaign_tables import MATERIAL_KEYS
 from ..errors import EffectError
-from ..records import Campaign
+from ..own_keys import DUST
+from ..records import Campaign, Material
 from ..sph import DropSetting
+from ..sph.materials import list_laws
 from ..text_files import load_toml
 from .contract import Effect, Instrument, Place, Values
 from .loading import list_effects
@@ -46,13 +51,14 @@ NO_LAW = Law()
 
 @dataclass(frozen=True)
 class Model:
-    """p_m in Pa; effects as (name, values by parameter); material as (field of Material, value) besides p_m; law : what stands in
-    the equations beside them."""
+    """p_m in Pa, or what is calibrated of another law (``matter``), SI; effects as (name, values by parameter); material as
+    (field of Material, value) besides p_m; law : what stands in the equations beside them."""
 
     p_m: float
     effects: tuple[tuple[str, Values], ...] = ()
     material: tuple[tuple[str, float], ...] = ()
     law: Law = NO_LAW
+    matter: str = DUST
 
 
 def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) -> Model:
@@ -66,10 +72,15 @@ def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) ->
             path, "format", f"{document['format']!r} is not a format this labsim reads; write {FORMAT}"
         )
     material = _table(path, "material", document.get("material", {}))
-    _refuse_others(path, "material", material, ("p_m_Pa", *MATERIAL_KEYS))
-    if "p_m_Pa" not in material:
-        raise EffectError(path, "material.p_m_Pa", "is missing; write p_m in Pa under [material]")
-    p_m = _number(path, "material.p_m_Pa", material["p_m_Pa"], *P_M_RANGE)
+    matter = material.get("law", DUST)
+    if matter not in list_laws():
+        raise EffectError(path, "material.law", f"{matter!r} is not a law; use {', '.join(list_laws())}")
+    column = name_column(matter)
+    _refuse_others(path, "material", material, ("law", column, *(MATERIAL_KEYS if matter == DUST else ())))
+    if column not in material:
+        raise EffectError(path, f"material.{column}", f"is missing; write {column} = ... under [material]")
+    limits = P_M_RANGE if matter == DUST else find_limits(matter)
+    p_m = _number(path, f"material.{column}", material[column], *limits)
     fields = tuple(
         (field, _number(path, f"material.{key}", material[key], low, high))
         for key, (field, low, high) in MATERIAL_KEYS.items()
@@ -102,7 +113,8 @@ def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) ->
                 },
             )
         )
-    return Model(p_m, tuple(chosen), fields, _read_law(path, _table(path, "law", document.get("law", {}))))
+    law = _read_law(path, _table(path, "law", document.get("law", {})))
+    return Model(p_m, tuple(chosen), fields, law, matter)
 
 
 def _read_law(path: Path, table: Mapping[str, Any]) -> Law:
@@ -155,7 +167,9 @@ def write_model(
     known = effects if effects is not None else list_effects()
     keys = {field: key for key, (field, _, _) in MATERIAL_KEYS.items()}
     lines = [f"# {line}" for comment in comments for line in comment.splitlines()]
-    lines += [f"format = {FORMAT}", "", "[material]", f"p_m_Pa = {float(model.p_m)!r}"]
+    lines += [f"format = {FORMAT}", "", "[material]"]
+    lines += [f'law = "{model.matter}"'] * (model.matter != DUST)
+    lines += [f"{name_column(model.matter)} = {float(model.p_m)!r}"]
     lines += [f"{keys[field]} = {float(value)!r}" for field, value in model.material]
     for name, values in model.effects:
         if name not in known:
@@ -204,10 +218,21 @@ def apply_model(
     setting: DropSetting, model: Model, place: Place, effects: Mapping[str, Effect] | None = None
 ) -> DropSetting:
     """The drop as the model has it: its p_m and material, then its effects, then its law."""
-    material = setting.material.replace(p_m=model.p_m, **dict(model.material))
+    material = apply_material(setting.material, model)
     return apply_law(
         apply_effects(setting.replace(material=material), model.effects, place, effects), model.law
     )
+
+
+def apply_material(material: Material, model: Model) -> Material:
+    """The material as the model has it. Raises EffectError where it is another law's."""
+    if material.law != model.matter:
+        raise EffectError(
+            "model",
+            "material.law",
+            f'is "{model.matter}", what is simulated is "{material.law}"; make them the same',
+        )
+    return set_value(material, model.p_m).replace(**dict(model.material))
 
 
 def make_instrument(model: Model, place: Place, effects: Mapping[str, Effect] | None = None) -> Instrument:

@@ -13,6 +13,7 @@ import numpy as np
 from ..effects import list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
+from ..own_keys import DUST
 from ..records import Campaign
 from .error_sizes import integrate_sizes
 from .fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
@@ -54,6 +55,10 @@ class Calibration:
     warnings: tuple[str, ...]
     doubts: int = 0  # how many of the warnings, the first ones, are about p_m itself: nobody should read it without them
 
+    def __repr__(self) -> str:
+        p_m = self.posterior.samples("p_m_Pa") / 1e3
+        return f"<Calibration of {self.campaign.name}: p_m = {p_m.mean():.3g} ± {p_m.std():.2g} kPa>"
+
 
 def prepare(
     campaign: Campaign,
@@ -87,10 +92,11 @@ def prepare(
     )
     bench.warnings += seen.warnings
     middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
-    start = max(min(middle, math.log(FIRST_START)), math.log(campaign.p_m_range[0]))
+    dust = campaign.material.law == DUST
+    start = max(min(middle, math.log(FIRST_START)), math.log(campaign.p_m_range[0])) if dust else middle
     nominal = fit_hypothesis(bench, (), (start, {}))
     if (
-        goodness_of_fit(nominal) < LOST
+        dust and goodness_of_fit(nominal) < LOST
     ):  # a law so wrong that Gauss-Newton may have run away: from other strengths too
         starts = [math.log(p) for p in OTHER_STARTS if campaign.p_m_range[0] <= p <= campaign.p_m_range[1]]
         fits = [nominal, *(fit_hypothesis(bench, (), (start, {})) for start in starts)]
@@ -244,7 +250,8 @@ def sample_fit(
     )
     moved, width = fit.over_shapes
     if width > 0.0:
-        p_m = posterior.data.posterior["p_m_Pa"]
+        name = posterior.names[0]
+        p_m = posterior.data.posterior[name]
         other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
-        posterior.data.posterior["p_m_Pa"] = p_m * np.exp(other)
+        posterior.data.posterior[name] = p_m * np.exp(other)
     return posterior

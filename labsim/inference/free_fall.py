@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..records import STANDARD_GRAVITY, Measured
-from .observe import ObservedDrop
-from .observe_acceleration import ObservedImpact
+from .observe import Observed
 
 STRAY = 4.0  # standard deviations from the middle of all drops: that drop's own fault
 SMALL_SHARE = 0.01  # relative: what is smaller is not worth a word
@@ -38,7 +37,7 @@ def agrees(ratio: Measured, middle: float) -> bool:
     return abs(ratio.value - middle) <= max(STRAY * ratio.sigma, SMALL_SHARE)
 
 
-def doubt_scales(drops: Sequence[ObservedDrop | ObservedImpact]) -> list[str]:
+def doubt_scales(drops: Sequence[Observed]) -> list[str]:
     """One line where free fall shows different g in different drops, naming those off the middle of all."""
     shown = [
         (drop.name, Measured(g.value / STANDARD_GRAVITY, g.sigma / STANDARD_GRAVITY))

@@ -8,23 +8,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from types import ModuleType
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..calibrated import set_value
 from ..records import Campaign, FloatArray, Projectile
+from ..records import Motion as Led
 from ..sph import DropSetting
+from ..sph.materials import find_law
 from .run_file import FailedRun
-from .run_parts import AnyPart, Compaction, Motion, Part
+from .run_parts import AnyPart, Compaction, Motion, Part, Push
 from .runs import Progress, RunStore
 
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
+PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
 FEWEST_SPEEDS = 3
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/numerics.md: 0.33 % of the depth left at that
 COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
+PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
+PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
+INERTIA = 0.005  # ρ v² of a push over its resistance
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
 
 Change = Callable[[DropSetting], DropSetting]
@@ -34,13 +42,15 @@ Change = Callable[[DropSetting], DropSetting]
 class Family:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
-    few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change.
+    few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change. pushed :
+    led through the ground at these speeds, not dropped.
     """
 
     projectile: Projectile
     speeds: tuple[float, ...]
     is_scan: bool
     few: tuple[int, ...]
+    pushed: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,17 +66,17 @@ class Request:
     cells: int | None
 
 
-def speed_nodes(slowest: float, fastest: float) -> tuple[float, ...]:
-    """Nodes of the fixed grid that enclose [slowest, fastest], at least FEWEST_SPEEDS of them."""
-    first = math.floor(math.log(slowest / SPEED_ANCHOR) / math.log(SPEED_RATIO) + 1e-9)
-    last = math.ceil(math.log(fastest / SPEED_ANCHOR) / math.log(SPEED_RATIO) - 1e-9)
+def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
+    """Nodes of the fixed grid that enclose [slowest, fastest], at least FEWEST_SPEEDS of them; ratio : of one to the next."""
+    first = math.floor(math.log(slowest / SPEED_ANCHOR) / math.log(ratio) + 1e-9)
+    last = math.ceil(math.log(fastest / SPEED_ANCHOR) / math.log(ratio) - 1e-9)
     while last - first + 1 < FEWEST_SPEEDS:
-        middle = math.log(math.sqrt(slowest * fastest) / SPEED_ANCHOR) / math.log(SPEED_RATIO)
+        middle = math.log(math.sqrt(slowest * fastest) / SPEED_ANCHOR) / math.log(ratio)
         if middle - first < last - middle:
             first -= 1
         else:
             last += 1
-    return tuple(SPEED_ANCHOR * SPEED_RATIO**k for k in range(first, last + 1))
+    return tuple(SPEED_ANCHOR * ratio**k for k in range(first, last + 1))
 
 
 def few_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
@@ -128,7 +138,7 @@ def set_nominal_drop(
     return DropSetting(
         projectile=projectile,
         impact_speed=speed,
-        material=campaign.material.replace(p_m=p_m),
+        material=set_value(campaign.material, p_m),
         filling_factor=campaign.sample.filling_factor,
         monomer_density=campaign.sample.monomer_density,
         gravity=campaign.gravity,
@@ -136,6 +146,55 @@ def set_nominal_drop(
         spacing=projectile.tip_radius / cells,
         after_stop=0.16,
     )
+
+
+def set_push(setting: DropSetting, speed: float) -> DropSetting:
+    """The same matter with the tip led from PUSHED[0] to PUSHED[1] tip radii at a speed (m/s), far from all walls, weightless."""
+    radius = setting.projectile.tip_radius
+    start, end = (each * radius for each in PUSHED)
+    return setting.replace(
+        motion=Led("pushed", start, (("speed", speed), ("end_depth", end))),
+        impact_speed=1.0,
+        gravity=0.0,
+        width=10 * radius,
+        depth=end + 5 * radius,
+        duration=10.0 * (end - start) / speed,
+    )
+
+
+def hasten(setting: DropSetting) -> DropSetting:
+    """A slow push as a faster one with the same answer: where ρ v² is small beside the resistance, speed enters by the rates of
+    the law alone, and these are taken as slow as they are. A faster one stays as it is.
+
+    The run's speed is where ρ v² is INERTIA of what a deep tip meets.
+    """
+    values = dict(setting.motion.values)
+    material, slow = setting.material, values["speed"]
+    law = find_law(material.law)
+    density = setting.filling_factor * setting.monomer_density
+    fast = math.sqrt(INERTIA * law.resistance(setting) / density)
+    ratio = fast / slow
+    if ratio <= 1.0:
+        return setting
+    constants = dict(material.constants)
+    if constants.get("rate_eta", 0.0) > 0.0:
+        exponent = constants.get("rate_exponent", default_of(law, "rate_exponent"))
+        constants["rate_eta"] *= ratio**-exponent
+    if constants.get("rate_log", 0.0) > 0.0:
+        constants["rate_reference"] = (
+            constants.get("rate_reference", default_of(law, "rate_reference")) * ratio
+        )
+    return setting.replace(
+        material=material.replace(constants=tuple(constants.items())),
+        strength_rate=setting.strength_rate * ratio**-setting.strength_rate_exponent,
+        motion=replace(setting.motion, values=tuple((values | {"speed": fast}).items())),
+        duration=setting.duration / ratio,
+    )
+
+
+def default_of(law: ModuleType, name: str) -> float:
+    """What a law takes for a parameter that nobody states."""
+    return float(next(each.default for each in law.PARAMETERS if each.name == name))
 
 
 @dataclass
@@ -154,8 +213,10 @@ class RunGrid:
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
-        own = SCAN_CELLS if family.is_scan else cells or self.cells
+        own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else cells or self.cells
         setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
+        if family.pushed:
+            setting = set_push(setting, speed)
         return setting if self.extension is None else self.extension(setting)
 
     def require(self, wanted: Sequence[Request], text: str) -> None:
@@ -175,8 +236,9 @@ class RunGrid:
                 setting = self.setting(
                     family, family.speeds[position], strength_node(request.index), request.cells
                 )
-                settings.append(request.change(setting) if request.change is not None else setting)
-                parts.append(Compaction if family.is_scan else Motion)
+                setting = request.change(setting) if request.change is not None else setting
+                settings.append(hasten(setting) if family.pushed else setting)
+                parts.append(Push if family.pushed else Compaction if family.is_scan else Motion)
             places.append((request, number, len(positions)))
         if not settings:
             return

@@ -8,15 +8,14 @@ from ..ct.reduce import ReducedScan, reduce_scan
 from ..errors import MeasurementError
 from ..records import Campaign
 from .observations.undisturbed import UndisturbedDust, observe_undisturbed
-from .observe import ObservedDrop, observe_drops
-from .observe_acceleration import ObservedImpact
+from .observe import Observed, observe_drops
 
 
 @dataclass
 class Measurements:
     """drops to be compared; reduced scans; dust : their undisturbed part; warnings : what had to be left out."""
 
-    drops: list[ObservedDrop | ObservedImpact]
+    drops: list[Observed]
     reduced: list[ReducedScan] = field(default_factory=list)
     dust: list[UndisturbedDust] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

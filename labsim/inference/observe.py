@@ -15,6 +15,7 @@ from ..records import Campaign, DecelerationCurve, Drop, FloatArray, Track
 from ..video.curve import fit_deceleration
 from ..video.track_file import read_track
 from .observe_acceleration import ObservedImpact, observe_impact
+from .observe_push import ObservedPush, observe_push
 
 MARGIN = 4  # frames kept after the depth has stopped growing
 # Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
@@ -54,6 +55,15 @@ class ObservedDrop:
     def pixel(self) -> float:
         assert self.drop.camera is not None
         return self.drop.camera.pixel_size
+
+
+Observed = ObservedDrop | ObservedImpact | ObservedPush  # what one instrument recorded of one drop or push
+
+
+def _list_warnings(seen: Observed) -> tuple[str, ...]:
+    if isinstance(seen, ObservedPush):
+        return seen.warnings
+    return (seen.impact if isinstance(seen, ObservedImpact) else seen.curve).warnings
 
 
 def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
@@ -97,24 +107,31 @@ def read_observed_track(drop: Drop) -> Track:
     """The track of a drop, from its file or from its video."""
     assert drop.camera is not None and drop.record.path is not None
     if drop.record.kind == "track":
-        return read_track(drop.record.path, drop.camera, drop.record.row_sigma)
+        return read_track(drop.record.path, drop.camera, drop.record.row_sigma, left_out=drop.record.left_out)
     from ..video import open_frames, track_projectile  # the readers of pixels are only needed here
 
-    return track_projectile(open_frames(drop.record.path), frame_rate=drop.camera.frame_rate)
+    return track_projectile(
+        open_frames(drop.record.path),
+        frame_rate=drop.camera.frame_rate,
+        region=drop.record.region,
+        left_out=drop.record.left_out,
+    )
 
 
-def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop | ObservedImpact], list[str]]:
+def observe_drops(campaign: Campaign) -> tuple[list[Observed], list[str]]:
     """Every drop that shows something; a line for each that does not, and for each thing that its track warns of.
 
     Raises MeasurementError where none does: the first one's.
     """
-    seen: list[ObservedDrop | ObservedImpact] = []
+    seen: list[Observed] = []
     failures: list[tuple[str, MeasurementError]] = []
     for drop in campaign.drops:
         if drop.record.kind == "summary":
             continue
         try:
-            if drop.accelerometer is not None:
+            if drop.gauge is not None:
+                seen.append(observe_push(drop, campaign))
+            elif drop.accelerometer is not None:
                 seen.append(observe_impact(drop))
             else:
                 seen.append(observe_drop(drop, read_observed_track(drop)))
@@ -126,7 +143,7 @@ def observe_drops(campaign: Campaign) -> tuple[list[ObservedDrop | ObservedImpac
     lines += [
         f"drop {drop.name}: {text}"
         for drop in seen
-        for text in (drop.impact if isinstance(drop, ObservedImpact) else drop.curve).warnings
+        for text in _list_warnings(drop)
         if not any(words in text for words in SAID_ELSEWHERE)
     ]
     return seen, lines

@@ -16,16 +16,18 @@ from ..records import Campaign, Projectile
 from ..sph import DropSetting
 from .curves import encode_run, encode_speeds
 from .forward import ResponseTable
-from .grid import Family, RunGrid, few_positions, speed_nodes
+from .grid import PUSH_RATIO, SPEED_RATIO, Family, RunGrid, few_positions, speed_nodes
 from .observations import Observation, RunFeatures, observe_further
-from .observations.acceleration_model import AccelerationModel, make_acceleration_model
+from .observations.acceleration_model import make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
-from .observations.drop_model import DropModel, make_drop_model
-from .observations.drop_terms import Terms
+from .observations.drop_model import make_drop_model
+from .observations.drop_terms import RecordModel, Terms
+from .observations.push_model import PushModel, encode_push
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
-from .observe import ObservedDrop, observe_drops
+from .observe import Observed, observe_drops
 from .observe_acceleration import ObservedImpact
+from .observe_push import ObservedPush, measure_ground
 from .runs import Progress, RunStore
 from .supported import refuse_others
 from .workbench import Workbench
@@ -45,7 +47,7 @@ def open_workbench(
     scheduler: str | None = None,
     progress: Progress | None = None,
     cells: int | None = None,
-    drops: list[ObservedDrop | ObservedImpact] | None = None,
+    drops: list[Observed] | None = None,
     scans: Sequence[ObservedScan] = (),
     undisturbed: Sequence[UndisturbedDust] = (),
     model: Model | None = None,
@@ -57,12 +59,29 @@ def open_workbench(
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
     observations: list[Observation] = []
-    models: list[DropModel | AccelerationModel] = []
+    models: list[RecordModel] = []
     features: list[RunFeatures] = []
     of_speeds: list[RunFeatures] = []
-    for projectile, group in group_alike((drop.drop.projectile, drop) for drop in drops).items():
-        nodes, few = _lay_out_speeds([drop.impact_speed for drop in group], SPEED_MARGIN)
+    dropped = [drop for drop in drops if not isinstance(drop, ObservedPush)]
+    pushed = [drop for drop in drops if isinstance(drop, ObservedPush)]
+    grouped = [
+        each
+        for seen in (dropped, pushed)
+        for each in group_alike((drop.drop.projectile, drop) for drop in seen).items()
+    ]
+    for projectile, group in grouped:
+        pushes = [drop for drop in group if isinstance(drop, ObservedPush)]
+        speeds_seen = [drop.impact_speed for drop in group]
+        nodes, few = _lay_out_speeds(speeds_seen, SPEED_MARGIN, PUSH_RATIO if pushes else SPEED_RATIO)
         table = ResponseTable(np.log(nodes), few)
+        if pushes:
+            ground = measure_ground(pushes)
+            numbers = sorted({int(n) for push in pushes for n in push.windows})
+            reference = numbers[len(numbers) // 2]
+            features.append(RunFeatures(len(families), table, encode_push))
+            families.append(Family(projectile, nodes, False, few, pushed=True))
+            models += [PushModel(push, table, ground, reference) for push in pushes]
+            continue
         features.append(RunFeatures(len(families), table, encode_run))
         families.append(Family(projectile, nodes, False, few))
         speeds = ResponseTable(np.log(nodes), few)
@@ -73,8 +92,9 @@ def open_workbench(
             if isinstance(drop, ObservedImpact)
             else make_drop_model(drop, table)
             for drop in group
+            if not isinstance(drop, ObservedPush)
         ]
-    observations.append(Tracks(tuple(models), (*features, *of_speeds)))
+    observations.append(Tracks(tuple(models), (*features, *of_speeds), name="drops" if dropped else "pushes"))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
         nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
@@ -132,14 +152,18 @@ def extend(bench: Workbench, model: Model) -> None:
     bench.grid.extension = apply
 
 
-def _lay_out_speeds(speeds: Sequence[float], margin: float) -> tuple[tuple[float, ...], tuple[int, ...]]:
+def _lay_out_speeds(
+    speeds: Sequence[float], margin: float, ratio: float = SPEED_RATIO
+) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
     slowest, fastest = min(speeds) / margin, max(speeds) * margin
-    nodes = speed_nodes(slowest, fastest)
+    nodes = speed_nodes(slowest, fastest, ratio)
     return nodes, few_positions(nodes, slowest, fastest)
 
 
-def group_alike(measured: Iterable[tuple[Projectile, Seen]]) -> dict[Projectile, list[Seen]]:
+def group_alike(
+    measured: Iterable[tuple[Projectile, Seen]],
+) -> dict[Projectile, list[Seen]]:
     """What was seen of projectiles that a simulation cannot tell apart, by all of them that it takes."""
     groups: dict[Projectile, list[Seen]] = {}
     for projectile, seen in measured:

@@ -43,8 +43,16 @@ class Posterior:
     steps: int
     autocorrelation: float
 
+    def __repr__(self) -> str:
+        return f"<Posterior of {', '.join(self.names)}: R-hat {self.r_hat:.3f}, {self.ess:.0f} independent samples>"
+
     def samples(self, name: str) -> FloatArray:
         return np.asarray(self.data.posterior[name].values).ravel()
+
+    @property
+    def calibrated(self) -> FloatArray:
+        """What is calibrated of the law, the first of ``names``: p_m (Pa) of dust."""
+        return self.samples(self.names[0])
 
 
 @dataclass(frozen=True)

@@ -47,5 +47,15 @@ class Compaction:
     particles: Dust
 
 
-Part = type[DropRun] | type[Motion] | type[Compaction]
-AnyPart = DropRun | Motion | Compaction
+@dataclass(frozen=True)
+class Push:
+    """What resisted a tip that was led."""
+
+    setting: DropSetting
+    depth: FloatArray
+    energies: dict[str, float]
+    stopped: bool
+
+
+Part = type[DropRun] | type[Motion] | type[Compaction] | type[Push]
+AnyPart = DropRun | Motion | Compaction | Push

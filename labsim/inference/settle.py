@@ -15,6 +15,8 @@ MOVED = 0.5  # of its standard deviation, that asks for them once more
 
 def list_large(bench: Workbench, fit: Fit) -> list[str]:
     """Effects of a fit that change runs and are larger than LARGE; not those of the numerics, whose runs cost too much."""
+    if any(family.pushed for family in bench.families):
+        return []  # what a rate changes of a push is smooth, and runs of amplitudes near each other differ by noise
     return [
         name
         for name, value in fit.values.items()

@@ -56,6 +56,10 @@ class SummaryCalibration:
     warnings: tuple[str, ...] = ()
     extra: dict = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        p_m = {name: self.quantiles[name] / 1e3 for name in ("q05", "q50", "q95")}
+        return f"<SummaryCalibration of {self.campaign.name}: p_m = {p_m['q50']:.3g} kPa, {p_m['q05']:.3g} to {p_m['q95']:.3g}>"
+
     @property
     def finest_run(self) -> DropRun:
         """The run with the smallest spacing at this calibration's bulk modulus."""
@@ -152,7 +156,7 @@ def calibrate_summary(
         bulk_modulus=modulus,
         figures=main.figures,
         posterior=posterior,
-        quantiles=summarise(posterior.samples("p_m_Pa")),
+        quantiles=summarise(posterior.calibrated),
         emulators=emulators,
         numerical=numerical,
         readings=tuple(found_readings),

@@ -1,29 +1,51 @@
-"""What is calibrated and diagnosed: drops into porous dust. Whatever else a campaign may hold is simulated only."""
+"""What is calibrated and diagnosed: drops, and pushes with a force record, into any law whose range leaves its runs room."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+from ..calibrated import find_limits, find_parameter
 from ..errors import InferenceError
 from ..own_keys import DUST
 from ..records import Campaign, Motion
+from .grid import strength_node
+from .nodes import enclosing_nodes
 
 INSTEAD = "labsim simulate --campaign CAMPAIGN --drop NAME simulates it"
 
 
 def refuse_others(campaign: Campaign) -> None:
-    """Raise InferenceError where a campaign states another law than the dust's or a motion that is no drop."""
-    if campaign.material.law != DUST:
-        raise InferenceError(
-            campaign.folder / "campaign.toml",
-            "material.law",
-            f'"{Path(campaign.material.law).stem}" is not calibrated, only "{DUST}" is; {INSTEAD}',
-        )
+    """Raise InferenceError where a campaign states what nothing is compared with."""
+    law, file = campaign.material.law, campaign.folder / "campaign.toml"
+    if law != DUST:
+        low, high = find_limits(law)
+        wanted = [
+            strength_node(node)
+            for end in campaign.p_m_range
+            for node in enclosing_nodes(math.log(end), campaign.p_m_range)
+        ]
+        if not low <= min(wanted) <= max(wanted) <= high:
+            name, unit = find_parameter(law)
+            raise InferenceError(
+                file,
+                "material.law",
+                f"{name} of {Path(law).stem} would be simulated from {min(wanted):.4g} to {max(wanted):.4g} {unit}, outside what "
+                f"the law allows, {low:.4g} to {high:.4g}: it is not calibrated; {INSTEAD}",
+            )
+        if campaign.scans or campaign.strength_tests:
+            raise InferenceError(
+                file,
+                "material.law",
+                f'scans and static tests are compared with "{DUST}" only; take them out of the campaign',
+            )
     for drop in campaign.drops:
+        if drop.record.kind == "force" and Path(drop.motion.kind).stem == "pushed":
+            continue
         if drop.motion != Motion():
             raise InferenceError(
                 campaign.folder / "drops" / drop.name / "drop.toml",
                 "motion.kind",
-                f'"{Path(drop.motion.kind).stem}" is not compared with a record, only a '
-                f"drop from above the surface is; {INSTEAD}, or take it out of the campaign",
+                f'"{Path(drop.motion.kind).stem}" with a record of kind "{drop.record.kind}" is not compared, only a drop from '
+                f"above the surface and a push with its force are; {INSTEAD}, or take it out of the campaign",
             )

@@ -14,8 +14,7 @@ from dataclasses import replace
 from ..own_keys import ROUND
 from ..records import STANDARD_GRAVITY, DecelerationCurve, Drop, Track
 from ..video.contact_row import find_surface_row
-from .observe import ObservedDrop
-from .observe_acceleration import ObservedImpact
+from .observe import Observed, ObservedDrop
 
 DOUBTED = 4.0  # standard deviations
 SCALE_SHARE = 0.01  # by which apparent gravity may be off before the pixel size is taken from it
@@ -55,7 +54,7 @@ def doubt_surface_row(drop: Drop, track: Track, curve: DecelerationCurve) -> str
     )
 
 
-def doubt_surface_rows(drops: Sequence[ObservedDrop | ObservedImpact]) -> list[str]:
+def doubt_surface_rows(drops: Sequence[Observed]) -> list[str]:
     """The same for every drop."""
     doubts = {
         seen.name: doubt_surface_row(seen.drop, seen.track, seen.curve)

@@ -20,8 +20,7 @@ from ..sph.particles import initial_filling_factor
 from .forward import Instant, predict_depth
 from .measure import Measurements
 from .observations.undisturbed import UndisturbedDust
-from .observe import ObservedDrop, observe_drop
-from .observe_acceleration import ObservedImpact
+from .observe import Observed, observe_drop
 from .truth import DRIFT, Hidden, TruthTable
 
 AFTER_STOP = 1.1  # frames kept, in stopping times
@@ -72,7 +71,7 @@ def measure_hidden(
     """
     campaign = truth.campaign
     places = list_places(campaign)
-    drops: list[ObservedDrop | ObservedImpact] = []
+    drops: list[Observed] = []
     for drop in campaign.drops:
         place, shift = places[drop.name], laboratory.samples * rng.standard_normal()
         if DRIFT in hidden.effects:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..calibrated import name_column
 from ..effects import Parameter
 from ..errors import InferenceError
 from ..records import FloatArray
@@ -21,7 +22,8 @@ from .workbench import Workbench
 
 @dataclass(frozen=True)
 class Target:
-    """The posterior about a fit, up to a constant. names : p_m_Pa and EFFECT.PARAMETER; a point is (ln p_m, amplitudes).
+    """The posterior about a fit, up to a constant. names : p_m_Pa (of another law what is calibrated of it) and
+    EFFECT.PARAMETER; a point is (ln p_m, amplitudes).
 
     misfit : (m, d) -> (m,) half the squared whitened residual; log_prior : the same shapes; bounds : (d, 2) of the prior;
     sizes : of ln p_m, what is gained on it by not knowing how large the solver's error is.
@@ -55,7 +57,10 @@ class Target:
 def make_target(bench: Workbench, fit: Fit) -> Target:
     """Flat prior in ln p_m, the effects' own priors, the covariance of the fit."""
     parameters = tuple(bench.effects[name].amplitudes[0] for name in fit.hypothesis)
-    names = ("p_m_Pa", *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)))
+    names = (
+        name_column(bench.campaign.material.law),
+        *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)),
+    )
     centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
 
     def miss(theta: FloatArray) -> FloatArray:

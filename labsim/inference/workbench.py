@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..calibrated import read_value, set_value
 from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
 from ..records import Campaign, FloatArray
@@ -26,8 +27,7 @@ from .observations.compacted_zone import CompactedZone, CompactedZones
 from .observations.drop_terms import Terms
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
-from .observe import ObservedDrop
-from .observe_acceleration import ObservedImpact
+from .observe import Observed
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Workbench:
     """A measured campaign with its runs: everything a fit needs."""
 
     campaign: Campaign
-    drops: list[ObservedDrop | ObservedImpact]
+    drops: list[Observed]
     grid: RunGrid
     families: list[Family]
     places: dict[str, Place]
@@ -117,17 +117,24 @@ class Workbench:
             if codes is not None and plain is not None:
                 entry[amplitude] = codes - plain
 
+    def state(self, family: Family, name: str = "") -> DropSetting:
+        """The nominal model of one family, or of one of its pushes at its own speed, in the middle of the range of p_m."""
+        speed = family.speeds[0]
+        for drop in self.campaign.drops if family.pushed else ():
+            if drop.name == name:
+                speed = dict(drop.motion.values)["speed"]
+        return self.grid.setting(family, speed, math.sqrt(math.prod(self.campaign.p_m_range)))
+
     def strength_only(self, name: str) -> bool:
         """Whether an effect changes nothing of a drop but p_m: then the base runs already hold it."""
         effect = self.effects[name]
         if effect.change_setting is None or not effect.amplitudes:
             return False
         parameter = effect.amplitudes[0]
-        family = self.families[0]
-        setting = self.grid.setting(family, family.speeds[0], 1000.0)
+        setting = self.state(self.families[0])
         place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
         changed = effect.apply(setting, {parameter.name: parameter.null + parameter.step}, place)
-        back = changed.replace(material=changed.material.replace(p_m=setting.material.p_m))
+        back = changed.replace(material=set_value(changed.material, read_value(setting.material)))
         return back == setting
 
     def at(self, name: str, amplitude: float) -> dict[str, float]:
@@ -187,7 +194,7 @@ class Workbench:
         place = self.places.get(name) or replace(
             next(iter(self.places.values())), name=name, sequence_fraction=0.0
         )
-        setting = self.grid.setting(self.families[0], self.families[0].speeds[0], 1000.0)
+        setting = self.state(self.families[0])
         for effect, amplitude in amplitudes.items():
             if amplitude != 0.0:
                 setting = self.effects[effect].apply(setting, self.at(effect, amplitude), place)
@@ -211,8 +218,6 @@ class Workbench:
     def log_offsets(self, amplitudes: Mapping[str, float]) -> dict[str, float]:
         """Change of ln p_m per drop by effects that act on the strength alone."""
         offsets = {name: 0.0 for name in self.places}
-        family = self.families[0]
-        setting = self.grid.setting(family, family.speeds[0], 1000.0)
         changes = [
             (effect_name, self.at(effect_name, amplitude))
             for effect_name, amplitude in amplitudes.items()
@@ -223,8 +228,9 @@ class Workbench:
         )
         for effect_name, values in changes:
             for name, place in self.places.items():
+                setting = self.state(self.families[0], name)
                 changed = self.effects[effect_name].apply(setting, values, place)
-                offsets[name] += math.log(changed.material.p_m / setting.material.p_m)
+                offsets[name] += math.log(read_value(changed.material) / read_value(setting.material))
         return offsets
 
     def costs_runs(self, name: str) -> bool:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..acceleration import find_impact, read_acceleration
 from ..errors import LabsimError
+from ..force import read_force
 from ..inference.observe import read_observed_track
+from ..inference.observe_push import observe_push
 from ..inference.surface_rows import doubt_surface_row
 from ..records import STANDARD_GRAVITY, Campaign, DecelerationCurve, Drop, Measured, Track
 from ..video import open_frames
 from ..video.curve import fit_deceleration
+from ..video.track_file import find_left_out
 from .found import Found, is_odd
 from .frames import count_missing, judge_frames
 from .scales import TOO_FAST
@@ -18,12 +23,17 @@ from .scales import TOO_FAST
 LEAST_FRAMES = 5  # of free fall above the surface
 LOST_SHARE = 0.2  # of the frames
 NARROW = 6.0  # container over tip diameter below which walls are felt
+LIFTED_SHARE = 0.02  # of the rows of a push, that are no deeper than one before
+GAP = 5.0  # steps of depth
+FLAT = 5  # rows at one largest value
 SAID_HERE = ("left out (frame", "no position")  # warnings of the curve that judge_frames says in other words
 
 
 def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
     projectile = drop.projectile
     size = f"{2e3 * projectile.tip_radius:.3g} mm {projectile.tip}, {projectile.mass * 1e6:.3g} mg"
+    if drop.gauge is not None:
+        return _inspect_push(drop, campaign)
     if drop.record.kind == "summary":
         return Found(drop.name, f"{size}: published figures")
     if drop.record.kind == "video":
@@ -50,6 +60,65 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
     if campaign.sample.diameter < NARROW * 2 * projectile.tip_radius:
         found.odd.append(
             f"the container is only {campaign.sample.diameter / 2 / projectile.tip_radius:.2g} tips wide: walls are felt"
+        )
+    return found
+
+
+def _inspect_push(drop: Drop, campaign: Campaign) -> Found:
+    """What the gauge says by itself: depths, resistance, and what of it can be no push."""
+    assert drop.record.path is not None and drop.gauge is not None
+    radius, speed = drop.projectile.tip_radius, dict(drop.motion.values).get("speed")
+    size = f"{2e3 * radius:.3g} mm {drop.projectile.tip}" + (f" at {1e3 * speed:g} mm/s" if speed else "")
+    try:
+        record = read_force(drop.record.path, drop.gauge, radius)
+        seen = observe_push(drop, campaign)
+    except LabsimError as trouble:
+        return Found(drop.name, f"{size}: no push can be read", trouble=trouble)
+    middle, largest = float(np.median(record.pressure)), float(record.pressure.max())
+    found = Found(
+        drop.name,
+        f"{size}: {record.depth.size} rows from {record.depth[0]:.4g} to {record.depth[-1]:.4g} m, {middle / 1e3:.4g} kPa in the "
+        f"middle, {largest / 1e3:.4g} kPa at most; {seen.windows.size} windows compared",
+        {
+            "rows": int(record.depth.size),
+            "rows_lost": record.lost,
+            "depth_from_m": float(record.depth[0]),
+            "depth_to_m": float(record.depth[-1]),
+            "pressure_median_Pa": middle,
+            "pressure_largest_Pa": largest,
+            "speed_m_s": speed,
+            "windows": int(seen.windows.size),
+        },
+    )
+    found.odd += seen.warnings
+    if record.lost:
+        found.odd.append(f"{record.lost} rows have no number")
+    if record.lifted > LIFTED_SHARE * record.depth.size:
+        found.odd.append(
+            f"{record.lifted} rows are no deeper than one before: the tip was lifted, or depth was lost"
+        )
+    steps = np.diff(record.depth)
+    gaps = steps > GAP * record.step
+    if gaps.any():
+        at = int(np.argmax(steps))
+        found.odd.append(
+            f"{int(gaps.sum())} gap{'s' * (gaps.sum() > 1)} in the depth, the largest {steps[at] * 1e3:.3g} mm at "
+            f"{record.depth[at]:.4g} m"
+        )
+    flat = np.sum(record.pressure >= largest * (1.0 - 1e-9))
+    if flat > FLAT:
+        found.odd.append(
+            f"{int(flat)} rows read the same largest value, {largest / 1e3:.4g} kPa: the gauge was at its limit"
+        )
+    low, high = float(record.pressure.min()), float(np.quantile(record.pressure, 0.99))
+    if low < -0.05 * high:
+        at = int(np.argmin(record.pressure))
+        found.odd.append(
+            f"resistance falls to {low / 1e3:.4g} kPa at {record.depth[at]:.4g} m: nothing pulls"
+        )
+    if record.depth[-1] > campaign.sample.depth:
+        found.odd.append(
+            f"goes to {record.depth[-1]:.4g} m, below the sample, which is {campaign.sample.depth:.4g} m deep"
         )
     return found
 
@@ -91,6 +160,9 @@ def _inspect_video(drop: Drop, size: str) -> Found:
         frames = open_frames(drop.record.path)
         for _ in frames:
             pass
+        if drop.record.region is not None:
+            frames.cut(drop.record.region)
+        find_left_out(drop.record.path, frames.numbers, drop.record.left_out)
     except LabsimError as trouble:
         return Found(drop.name, f"{size}: the video cannot be read", trouble=trouble)
     line = f"{size}: video of {len(frames)} frames, its motion is not read here (labsim track)"

@@ -11,11 +11,12 @@ def list_missing(campaign: Campaign) -> list[str]:
     """One line for each thing that is missing."""
     lines = []
     tracked = [drop for drop in campaign.drops if drop.record.kind != "summary"]
-    if tracked and not campaign.scans:
+    dropped = [drop for drop in tracked if drop.gauge is None]
+    if dropped and not campaign.scans:
         lines.append(
             "no CT scan: nothing is seen of the dust itself; scale of the CT, crust and gradient cannot be told"
         )
-    if tracked and len({round(drop.projectile.tip_radius, 7) for drop in tracked}) == 1:
+    if dropped and len({round(drop.projectile.tip_radius, 7) for drop in tracked}) == 1:
         lines.append("one tip radius only: causes that depend on size look like others")
     heights = [drop.height.value for drop in tracked if drop.height is not None]
     if heights and max(heights) < 4 * min(heights):
@@ -24,7 +25,7 @@ def list_missing(campaign: Campaign) -> list[str]:
         lines.append(
             f"{len(tracked)} tracked drop{'s' * (len(tracked) > 1)}: p_m can be found, the scatter of samples and causes hardly"
         )
-    blank = [drop.name for drop in tracked if drop.projectile.mass_sigma == 0]
+    blank = [drop.name for drop in dropped if drop.projectile.mass_sigma == 0]
     if blank:
         lines.append(f"mass_sigma_mg is 0 or not given in {shorten(blank)}: the mass is taken as exact")
     if campaign.sample.filling_factor_sigma == 0:

@@ -20,13 +20,13 @@ from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .drop_views import DropView
-from .look import BLUE, GREY, INK, ORANGE, STYLE, new_figure
+from .look import BLUE, GREY, INK, ORANGE, PHI, STYLE, new_figure
 from .map_views import MapView
 
 COLOURS = (ORANGE, BLUE)  # nominal, extended
-PHI: dict[str, Any] = {"vmin": 0.13, "vmax": 0.28, "cmap": "viridis"}
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
+P_M = "$p_\\mathrm{m}$ (kPa)"
 PANEL = (2.9, 3.1)  # inches a drop, across and down
 LEFT, BELOW, ABOVE = 0.62, 0.5, 0.25  # inches, margins of pictures of many panels
 
@@ -128,8 +128,8 @@ def draw_maps(views: Sequence[MapView], path: Path) -> Path:
         rows += [
             [
                 measured,
-                (view, f"φ simulated, {name}", view.simulated[name], PHI),
-                (view, f"measured − {name}", view.left(name), DIFFERENCE),
+                (view, f"φ simulated, {name.replace('_', ' ')}", view.simulated[name], PHI),
+                (view, f"measured − {name.replace('_', ' ')}", view.left(name), DIFFERENCE),
             ]
             for name in view.simulated
         ] or [[measured]]
@@ -144,9 +144,9 @@ def draw_maps(views: Sequence[MapView], path: Path) -> Path:
             for ax, (view, title, values, colours) in zip(line, shown, strict=False):
                 _draw_map(ax, view, values, colours)
                 ax.set_title(title, fontsize=9)
-            line[0].set_ylabel("z (mm)")
+            line[0].set_ylabel("height above the surface (mm)")
         for ax in axes[-1]:
-            ax.set_xlabel("r (mm)")
+            ax.set_xlabel("distance from the axis (mm)")
         figure.savefig(path)
         plt.close(figure)
     return path
@@ -164,13 +164,16 @@ def _draw_map(ax: Axes, view: MapView, values: FloatArray, colours: dict[str, An
     ax.set(visible=True, aspect="equal", ylim=(found.z.min() * 1e3, found.z.max() * 1e3))
 
 
-def draw_posterior(posterior: Posterior, path: Path) -> Path:
-    """Corner plot of the posterior; p_m in kPa."""
+def draw_posterior(posterior: Posterior, path: Path) -> Path | None:
+    """Corner plot of the posterior; p_m in kPa. None of a single parameter, whose histogram ``draw_p_m`` draws."""
+    path.unlink(missing_ok=True)
+    if len(posterior.names) < 2:
+        return None
     columns, labels = [], []
     for name in posterior.names:
         values = posterior.samples(name)
         columns.append(values / 1e3 if name == "p_m_Pa" else values)
-        labels.append("p_m (kPa)" if name == "p_m_Pa" else name)
+        labels.append(P_M if name == "p_m_Pa" else name.replace("_", " ").replace(".", ": "))
     with plt.rc_context(STYLE):
         figure = corner.corner(
             np.stack(columns, axis=1)[::10],
@@ -190,7 +193,7 @@ def draw_causes(found: Diagnosis, path: Path) -> Path:
     shown = found.verdict.probabilities[:8]
     with new_figure(path, 6.4, 0.4 * len(shown) + 1.0) as figure:
         ax = figure.subplots()
-        names = [" + ".join(hypothesis) for hypothesis, _ in shown][::-1]
+        names = [" + ".join(hypothesis).replace("_", " ") for hypothesis, _ in shown][::-1]
         values = [probability for _, probability in shown][::-1]
         ax.barh(names, values, color=[BLUE if v == max(values) else GREY for v in values])
         for row, value in enumerate(values):
@@ -200,14 +203,19 @@ def draw_causes(found: Diagnosis, path: Path) -> Path:
     return path
 
 
-def draw_p_m(posteriors: Sequence[tuple[str, Posterior]], path: Path) -> Path:
-    """Posterior density of p_m in kPa, a line a model."""
+def draw_p_m(
+    posteriors: Sequence[tuple[str, Posterior]],
+    path: Path,
+    parameter: tuple[str, str, float] = ("p_m", "kPa", 1e-3),
+) -> Path:
+    """Posterior density of p_m in kPa, a line a model. parameter : label, unit and factor of what else is calibrated."""
+    label, unit, factor = parameter
     with new_figure(path, 6.4, 2.8) as figure:
         ax = figure.subplots()
         for (name, posterior), color in zip(posteriors, COLOURS, strict=False):
-            values = posterior.samples("p_m_Pa") / 1e3
+            values = posterior.calibrated * factor
             ax.hist(values, bins=60, density=True, histtype="stepfilled", alpha=0.35, color=color, label=name)
-        ax.set_xlabel("p_m (kPa)")
+        ax.set_xlabel(P_M if label == "p_m" else f"{label} ({unit})")
         ax.set_ylabel("density")
         ax.set_yticks([])
         ax.legend(fontsize=8)
@@ -238,24 +246,28 @@ def draw_undisturbed(bench: Workbench, path: Path) -> Path:
     return path
 
 
-def draw_held_out(found: Diagnosis, labels: Sequence[str], path: Path) -> Path:
-    """Rms of each held-out drop, a bar a model."""
+def draw_held_out(
+    found: Diagnosis, labels: Sequence[str], path: Path, shown: tuple[float, str] = (1e6, "µm")
+) -> Path:
+    """Rms of each held-out drop, a bar a model. shown : factor and unit."""
+    factor, unit = shown
     sizes = [found.held_out_nominal.rms, found.held_out_extended.rms][: len(labels)]
     with new_figure(path, 6.4, 3.2) as figure:
         ax = figure.subplots()
         place = np.arange(len(found.held_out_nominal.names))
         width = 0.8 / len(labels)
         for k, (label, rms) in enumerate(zip(labels, sizes, strict=True)):
-            ax.bar(place - 0.4 + width * (k + 0.5), rms * 1e6, width, color=COLOURS[k], label=label)
+            ax.bar(place - 0.4 + width * (k + 0.5), rms * factor, width, color=COLOURS[k], label=label)
         ax.plot(
             place,
-            found.held_out_extended.expected * 1e6,
+            found.held_out_extended.expected * factor,
             "_",
             color=INK,
             ms=14,
             label="expected of a true model",
         )
-        ax.set_xticks(place, found.held_out_nominal.names, fontsize=8)
-        ax.set_ylabel("rms of the held-out drop (µm)")
+        many = len(place) > 16
+        ax.set_xticks(place, found.held_out_nominal.names, fontsize=7 if many else 8, rotation=90 * many)
+        ax.set_ylabel(f"rms of what is held out ({unit})")
         ax.legend(fontsize=8)
     return path

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..calibrated import find_parameter, show_parameter
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
 from ..diagnosis.misfit import say_misfit
@@ -19,7 +21,7 @@ from ..inference.calibrate import Calibration
 from ..inference.posterior import Posterior
 from ..inference.summary import summarise
 from ..inference.workbench import Workbench
-from ..records import FloatArray
+from ..records import Campaign, FloatArray
 from ..sph import solver_hash
 from .law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
 from .phrases import CERTAIN, say_amount, say_combination, say_hypothesis, say_probability
@@ -34,11 +36,11 @@ MOST_SAID = 3  # causes that are not testable, on one line
 
 def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
     """calibration.json."""
-    others = [name for name in found.posterior.names if name != "p_m_Pa"]
+    first, *others = found.posterior.names
     return {
         "campaign": found.campaign.name,
-        "p_m_Pa": summarise(found.posterior.samples("p_m_Pa")),
-        "calibrated": _name_calibrated(found.posterior.samples("p_m_Pa")),
+        first: summarise(found.posterior.calibrated),
+        "calibrated": _name_calibrated(found.campaign, found.posterior.calibrated),
         "parameters": {name: summarise(found.posterior.samples(name)) for name in others},
         "r_hat": found.posterior.r_hat,
         "ess": found.posterior.ess,
@@ -50,33 +52,59 @@ def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,
         "wall_s": found.wall,
-        "solver": solver_hash(),
+        "solver": solver_hash(found.campaign.material.law),
         "warnings": list(found.warnings),
     }
 
 
-def _name_calibrated(samples: FloatArray) -> dict[str, Any]:
-    """What is calibrated, whatever the law: only porous_dust is, as yet (inference/supported.py)."""
-    return {"name": "p_m", "unit": "Pa", **summarise(samples)}
+def _name_calibrated(campaign: Campaign, samples: FloatArray) -> dict[str, Any]:
+    """What is calibrated, whatever the law."""
+    name, unit = find_parameter(campaign.material.law)
+    return {"name": name, "unit": unit, **summarise(samples)}
+
+
+def say_calibrated(campaign: Campaign, value: float, digits: str = ".2f") -> str:
+    """``1.35 kPa``: a value (SI) of what is calibrated, as people see it."""
+    _, unit, factor = show_parameter(campaign.material.law)
+    return f"{value * factor:{digits}} {unit}"
+
+
+def is_pushed(bench: Workbench) -> bool:
+    """Whether the records are those of pushes."""
+    return any(family.pushed for family in bench.families)
+
+
+def say_records(bench: Workbench) -> str:
+    """``drops`` or ``pushes``."""
+    return "pushes" if is_pushed(bench) else "drops"
+
+
+def say_count(bench: Workbench) -> str:
+    """``1 drop``, ``25 pushes``."""
+    count, records = len(bench.tracks.models), say_records(bench)
+    return f"{count} {records if count != 1 else 'push' if records == 'pushes' else 'drop'}"
 
 
 def campaign_calibration_lines(found: Calibration) -> str:
-    p_m = summarise(found.posterior.samples("p_m_Pa"))
-    drops, scans = len(found.bench.tracks.models), len(found.bench.scans)
+    q, (label, unit, factor) = (
+        summarise(found.posterior.calibrated),
+        show_parameter(found.campaign.material.law),
+    )
+    mean, sd, low, high = (q[key] * factor for key in ("mean", "sd", "q05", "q95"))
+    scans = len(found.bench.scans)
     others = [each.name for each in found.bench.observations if each.kind not in ("drops", "map")]
     beside = "".join(f", {name}" for name in others)
     lines = [
         *_say_doubts(found),
-        f"{found.campaign.name}: p_m = {p_m['mean'] / 1e3:.3f} ± {p_m['sd'] / 1e3:.3f} kPa "
-        f"(90 %: {p_m['q05'] / 1e3:.3f} to {p_m['q95'] / 1e3:.3f} kPa)",
+        f"{found.campaign.name}: {label} = {mean:.3f} ± {sd:.3f} {unit} (90 %: {low:.3f} to {high:.3f} {unit})",
     ]
     for name in found.posterior.names[1:]:
         q = summarise(found.posterior.samples(name))
         lines.append(f"  {name} = {q['mean']:.4g} ± {q['sd']:.2g}")
     lines += [
-        f"  {drops} drop{'s' * (drops != 1)}, {scans} scan{'s' * (scans != 1)}{beside}; χ² {found.fit.chi_square:.0f} for "
+        f"  {say_count(found.bench)}, {scans} scan{'s' * (scans != 1)}{beside}; χ² {found.fit.chi_square:.0f} for "
         f"{found.fit.points} data (p = {found.p_value:.2g})",
-        f"  scatter of ln p_m from sample to sample {found.scatter.mean:.3f} ± {found.scatter.sd:.3f}"
+        f"  scatter of ln {label} from sample to sample {found.scatter.mean:.3f} ± {found.scatter.sd:.3f}"
         f" ({found.bench.terms.scatter:.2g} in use)",
         f"  R-hat {found.posterior.r_hat:.3f}, {found.posterior.ess:.0f} independent samples; "
         f"{found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s",
@@ -127,6 +155,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             cause["free_law"] = describe_unknown(found)
         causes.append(cause)
     gain = found.gain
+    unit = "" if is_pushed(found.bench) else "_m"  # of a push what is left is relative
     return {
         "format": 1,
         "campaign": found.campaign.name,
@@ -145,7 +174,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
                 "trace_sigma": each.trace,
                 "value": list(each.values),
                 "unit": found.bench.effects[each.name].amplitudes[0].unit,
-                "p_m_Pa": list(each.p_m),
+                found.posterior_nominal.names[0]: list(each.p_m),
             }
             for each in found.untestable
         ],
@@ -155,23 +184,23 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             "value": found.combination.value,
             "sigma": found.combination.value * found.combination.sigma,
         },
-        "p_m_Pa": {
-            "nominal": summarise(found.posterior_nominal.samples("p_m_Pa")),
-            "extended": summarise(found.posterior_extended.samples("p_m_Pa")),
+        found.posterior_nominal.names[0]: {
+            "nominal": summarise(found.posterior_nominal.calibrated),
+            "extended": summarise(found.posterior_extended.calibrated),
             "over_causes": summarise(found.p_m_averaged),
         },
-        "calibrated": _name_calibrated(found.p_m_averaged),
+        "calibrated": _name_calibrated(found.campaign, found.p_m_averaged),
         "gain": {
-            "rms_nominal_m": gain.rms_nominal,
-            "rms_extended_m": gain.rms_extended,
-            "rms_noise_m": gain.rms_noise,
+            f"rms_nominal{unit}": gain.rms_nominal,
+            f"rms_extended{unit}": gain.rms_extended,
+            f"rms_noise{unit}": gain.rms_noise,
             "log_score_difference": gain.log_score_difference,
             "log_score_difference_sigma": gain.log_score_difference_sigma,
             "fraction_of_discrepancy_removed": gain.fraction_removed,
             "p_value": found.predicted,
             "extension": list(found.best.hypothesis),
             "drops": [
-                {"name": name, "rms_nominal_m": float(a), "rms_extended_m": float(b)}
+                {"name": name, f"rms_nominal{unit}": float(a), f"rms_extended{unit}": float(b)}
                 for name, a, b in zip(
                     found.held_out_nominal.names,
                     found.held_out_nominal.rms,
@@ -189,7 +218,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,
         "wall_s": found.wall,
-        "solver": solver_hash(),
+        "solver": solver_hash(found.campaign.material.law),
         "warnings": list(found.warnings),
     }
 
@@ -197,12 +226,6 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
 def say_verdict(found: Diagnosis) -> str:
     """The verdict as one sentence that a laboratory can act on; numbers are medians of the posteriors."""
     best, probability = found.verdict.probabilities[0]
-    nominal = np.median(found.posterior_nominal.samples("p_m_Pa")) / 1e3
-    if found.verdict.word == "none":
-        return (
-            f"The nominal simulation explains these data at p_m = {nominal:.2f} kPa "
-            f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
-        )
     if found.verdict.word == "unknown":
         missing = f"what is missing {say_missing(found)}"
         if comes_nearest(found):
@@ -213,6 +236,13 @@ def say_verdict(found: Diagnosis) -> str:
         return (
             "The simulation is wrong in a way that no listed cause explains (probability "
             f"{say_probability(probability)}): {missing}."
+        )
+    label, _, _ = show_parameter(found.campaign.material.law)
+    nominal = say_calibrated(found.campaign, float(np.median(found.posterior_nominal.calibrated)))
+    if found.verdict.word == "none":
+        return (
+            f"The nominal simulation explains these data at {label} = {nominal} "
+            f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
         )
     parts = []
     for name in best:
@@ -227,26 +257,28 @@ def say_verdict(found: Diagnosis) -> str:
         parts.append(f"{title} ({name}: {parameter.name} = {amount})")
     apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in found.verdict.named[1:])
     hardly = f" (these data hardly tell it from {apart})" if apart else ""
-    p_m = f"{np.median(found.posterior_extended.samples('p_m_Pa')) / 1e3:.2f} kPa"
-    before = f"{nominal:.2f} kPa"
-    moved = f"is {p_m} instead of {before}" if p_m != before else f"stays {p_m}"
+    extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
+    moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
     return (
         f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}{hardly}; with "
-        f"{' + '.join(best)} p_m {moved}, and "
-        f"{say_gain(found.gain)}."
+        f"{' + '.join(best)} {label} {moved}, and "
+        f"{say_gain(found.gain, say_records(found.bench))}."
     )
 
 
-def say_gain(gain: Gain) -> str:
-    """What held-out drops say of the extension, in words."""
+def say_gain(gain: Gain, records: str = "drops") -> str:
+    """What held-out drops, or pushes, say of the extension, in words."""
     if math.isnan(gain.rms_nominal):
-        return "a single drop leaves none to hold out"
+        return f"a single {'push' if records == 'pushes' else 'drop'} leaves none to hold out"
+    if gain.rms_nominal <= gain.rms_noise and records != "drops":
+        return f"held-out {records} were predicted within the noise without it"
     if gain.rms_nominal <= gain.rms_noise:
         return "held-out drops, whose own free fall fixes contact and speed, were predicted within the noise without it"
-    return f"on held-out drops {100 * gain.fraction_removed:.0f} % of the removable discrepancy is gone"
+    return f"on held-out {records} {100 * gain.fraction_removed:.0f} % of the removable discrepancy is gone"
 
 
 def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
+    label, unit, factor = show_parameter(found.campaign.material.law)
     lines = [*_say_doubts(found), say_verdict(found), say_remedy(found, suggestions), ""]
     lines.append("  probability  cause")
     worth = [each for each in found.verdict.probabilities if each[1] >= 5e-4][:6]
@@ -255,17 +287,20 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     if others := found.verdict.probabilities[len(worth) :]:
         lines.append(f"  {sum(p for _, p in others):11.3f}  the {len(others)} others together")
     if found.verdict.word == "effect" and found.verdict.probabilities[0][1] < CERTAIN:
-        low, high = np.quantile(found.p_m_averaged, [0.05, 0.95]) / 1e3
-        lines.append(f"  p_m whichever of these is at work: {low:.2f} to {high:.2f} kPa (90 %)")
+        low, high = np.quantile(found.p_m_averaged, [0.05, 0.95]) * factor
+        lines.append(f"  {label} whichever of these is at work: {low:.2f} to {high:.2f} {unit} (90 %)")
     gain = found.gain
+    shown, of_shown = (100.0, "%") if is_pushed(found.bench) else (1e6, "µm")
     nearest = "the nearest listed cause, " if found.verdict.word == "unknown" else ""
     lines.append(
-        f"  held-out drops: rms {gain.rms_nominal * 1e6:.1f} µm nominal, {gain.rms_extended * 1e6:.1f} µm with "
-        f"{nearest}{' + '.join(found.best.hypothesis) or 'nothing added'}, {gain.rms_noise * 1e6:.1f} µm expected; ln score "
+        f"  held-out {say_records(found.bench)}: rms {gain.rms_nominal * shown:.1f} {of_shown} nominal, "
+        f"{gain.rms_extended * shown:.1f} {of_shown} with "
+        f"{nearest}{' + '.join(found.best.hypothesis) or 'nothing added'}, {gain.rms_noise * shown:.1f} {of_shown} expected; "
+        f"ln score "
         f"{gain.log_score_difference:+.1f} ± {gain.log_score_difference_sigma:.1f}"
     )
     lines.append(
-        f"  nominal model: p = {found.p_value:.2g}; scatter between samples {found.scatter.mean:.3f} of ln p_m"
+        f"  nominal model: p = {found.p_value:.2g}; scatter between samples {found.scatter.mean:.3f} of ln {label}"
     )
     if missed := say_misfit(found.misfit):
         lines.append(f"  the nominal model {missed}")
@@ -285,8 +320,9 @@ def _say_untestable(found: Diagnosis) -> list[str]:
     """Causes that could be there unseen, where they would move p_m by more than its error; and what holds all the same."""
     if found.combination is None:
         return []
+    label, unit, factor = show_parameter(found.campaign.material.law)
     named = [
-        f"{each.name} (p_m would be {each.p_m[0] / 1e3:.3g} to {each.p_m[1] / 1e3:.3g} kPa)"
+        f"{each.name} ({label} would be {each.p_m[0] * factor:.3g} to {each.p_m[1] * factor:.3g} {unit})"
         for each in found.untestable[:MOST_SAID]
     ]
     further = len(found.untestable) - MOST_SAID
@@ -310,4 +346,4 @@ def extended_model(found: Diagnosis) -> Model:
         for name in (found.best.hypothesis if found.verdict.word == "effect" else ())
     )
     fit = found.best if found.verdict.word == "effect" else found.nominal
-    return Model(p_m=math.exp(fit.log_p_m), effects=effects)
+    return Model(p_m=math.exp(fit.log_p_m), effects=effects, matter=Path(found.campaign.material.law).stem)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..inference.fitting import Fit
+from ..inference.observe_push import ObservedPush
 from ..inference.posterior import Posterior
 from ..inference.scatter import ScatterEstimate
 from ..inference.workbench import Workbench
@@ -21,7 +22,7 @@ from .phrases import add_article, list_names, say_count, say_range, shown_unit, 
 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
     sample = campaign.sample
-    frames = sum(model.observed.time.size for model in bench.tracks.models)
+    frames = sum(each.time.size for each in bench.drops if not isinstance(each, ObservedPush))
     tests = f", {say_count(len(campaign.strength_tests), 'static test')}" if campaign.strength_tests else ""
     words = (
         f"{say_count(len(views), 'drop')} with {frames} frames, {say_count(len(campaign.scans), 'CT scan')}{tests}, into dust of "
@@ -47,7 +48,7 @@ def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[D
                 "height": say_range(heights, "{:.3g}"),
                 "rate": show_number(rate, "{:g}"),
                 "pixel": show_number(pixel * 1e6 if pixel else None, "{:g}"),
-                "used": sum(each.time.size for each in observed),
+                "used": sum(each.time.size for each in observed if not isinstance(each, ObservedPush)),
                 "rejected": sum(each.rejected for each in observed),
             }
         )

@@ -12,6 +12,7 @@ from ..inference.fitting import Fit
 from ..inference.forward import Instant, predict_depth
 from ..inference.observations.acceleration_model import AccelerationModel
 from ..inference.observations.drop_model import DropModel
+from ..inference.observations.push_model import PushModel
 from ..inference.workbench import Workbench
 from ..records import STANDARD_GRAVITY, FloatArray, Projectile
 
@@ -111,6 +112,8 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
                 _view_acceleration(bench, fits, model, instant, [seen_by[name][k] for name, _ in fits])
             )
             continue
+        if isinstance(model, PushModel):
+            continue  # of pushes there is a page of its own
         observed = model.observed
         clock = observed.time - instant.contact_time
         seen = clock > -BEFORE * max(clock.max(), 1e-9)
@@ -191,7 +194,7 @@ def contact_offset(bench: Workbench, fit: Fit) -> float:
     drops, size = fit.drops, bench.terms.contact_offset
     column = np.zeros(drops.residual.size)
     for model in bench.tracks.models:
-        if isinstance(model, AccelerationModel):
+        if not isinstance(model, DropModel):
             continue
         section = drops.sections[model.observed.name]
         column[section.start : section.start + model.matrix.shape[0]] = size * model.radius

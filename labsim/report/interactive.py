@@ -13,8 +13,9 @@ import numpy as np
 
 from ..inference.posterior import Posterior
 from ..records import FloatArray
-from .campaign_figures import DIFFERENCE, PHI, say_projectile
+from .campaign_figures import DIFFERENCE, say_projectile
 from .drop_views import DropView
+from .look import PHI
 from .map_views import MapView
 
 ROLES = ("nominal", "extended")
@@ -111,7 +112,7 @@ def plot_p_m(posteriors: Sequence[tuple[str, Posterior]]) -> Spec:
     """Posterior densities of p_m, kPa."""
     data = []
     for role, (name, posterior) in zip(ROLES, posteriors, strict=False):
-        middle, density = smooth_density(posterior.samples("p_m_Pa") / 1e3)
+        middle, density = smooth_density(posterior.calibrated / 1e3)
         data.append(
             {
                 "type": "scatter", "mode": "lines", "x": middle, "y": density / density.max(), "fill": "tozeroy",

@@ -39,7 +39,7 @@ def trace_origin(campaign: Campaign, further: list[tuple[str, str]]) -> Provenan
     total = hashlib.sha256("".join(f"{each.name} {each.digest}\n" for each in inputs).encode()).hexdigest()
     lines = [
         ("labsim", __version__),
-        ("solver", solver_hash()),
+        ("solver", solver_hash(campaign.material.law)),
         ("inputs, all together (SHA-256)", total),
         *further,
         ("Python", f"{platform.python_version()}, {platform.system()} {platform.machine()}"),

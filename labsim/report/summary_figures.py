@@ -174,7 +174,7 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
     """Posterior of p_m, and of the depth and stopping time that go with it, with the published values as lines."""
     drop = calibration.figures[0].drop
     emulator = calibration.emulators[drop, calibration.bulk_modulus]
-    p_m = calibration.posterior.samples("p_m_Pa")
+    p_m = calibration.posterior.calibrated
     outputs = emulator.predict(p_m[:, None])
     published = next(d.published for d in calibration.campaign.drops if d.name == drop)
     assert published is not None

@@ -7,7 +7,7 @@ from .curve import fit_deceleration
 from .formats.folder import read_picture
 from .frames import Frames, open_frames
 from .local import fit_local_polynomial
-from .overlay import draw_contact_sheet, write_overlay
+from .overlay import draw_contact_sheet, encode_picture, find_top, write_overlay
 from .scale import measure_ruler, scale_from_diameter
 from .seen import draw_scene
 from .track_file import make_track, read_track, tabulate_curve, tabulate_track, write_curve, write_track
@@ -19,6 +19,8 @@ __all__ = [
     "check_drop_height",
     "draw_contact_sheet",
     "draw_scene",
+    "encode_picture",
+    "find_top",
     "fit_deceleration",
     "fit_local_polynomial",
     "follow_projectile",

@@ -86,6 +86,25 @@ class Frames:
             _kept=None,
         )
 
+    def cut(self, region: tuple[int, int, int, int]) -> Frames:
+        """Only the columns left to right and the rows top to bottom of every picture (px, both ends included)."""
+        left, top, right, bottom = region
+        height, width = self.shape
+        if not (0 <= left < right < width and 0 <= top < bottom < height):
+            raise MeasurementError(
+                self.path,
+                "record.region_px",
+                f"[{left}, {top}, {right}, {bottom}] is not inside the picture; columns go to {width - 1}, rows to {height - 1}",
+            )
+        start = self.start
+        return replace(
+            self,
+            start=lambda: (np.ascontiguousarray(p[top : bottom + 1, left : right + 1]) for p in start()),
+            shape=(bottom + 1 - top, right + 1 - left),
+            warnings=list(self.warnings),
+            _kept=None,
+        )
+
     def turned(self, degrees: int) -> Frames:
         """The same video turned anticlockwise by 90, 180 or 270 degrees."""
         if degrees % 360 == 0:

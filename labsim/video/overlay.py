@@ -44,6 +44,22 @@ def draw_contact_sheet(
     return [drawn[i] for i in moments if i in drawn]
 
 
+def encode_picture(picture: np.ndarray, top: float) -> bytes:
+    """One picture as PNG, grey levels without loss up to ``top``, which becomes nearly white."""
+    done, content = cv2.imencode(".png", _brighten(picture, top), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    assert done
+    return content.tobytes()
+
+
+def find_top(picture: np.ndarray) -> float:
+    """Grey level of a picture's brightest parts, single pixels left out."""
+    return max(float(np.percentile(picture, 99.5)), 1.0)
+
+
+def _brighten(picture: np.ndarray, top: float) -> np.ndarray:
+    return np.clip(picture.astype(np.float32) * (235.0 / top), 0, 255).astype(np.uint8)
+
+
 def _zoom(shape: tuple[int, int]) -> int:
     return max(1, min(3, 700 // max(shape)))
 
@@ -64,9 +80,8 @@ def _draw(
         if wanted is not None and i not in wanted:
             continue
         if top is None:
-            top = max(float(np.percentile(picture, 99.5)), 1.0)
-        grey = np.clip(picture.astype(np.float32) * (235.0 / top), 0, 255).astype(np.uint8)
-        large = cv2.resize(grey, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_NEAREST)
+            top = find_top(picture)
+        large = cv2.resize(_brighten(picture, top), None, fx=zoom, fy=zoom, interpolation=cv2.INTER_NEAREST)
         image = cv2.cvtColor(large, cv2.COLOR_GRAY2BGR)
 
         def at(value: float) -> int:

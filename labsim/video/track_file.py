@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,26 +12,50 @@ from ..errors import MeasurementError
 from ..records import Camera, DecelerationCurve, FloatArray, Track
 from ..tracks import TrackRows, read_rows
 
+LEFT_OUT = "left out in drop.toml"
 
-def read_track(path: Path | str, camera: Camera, row_sigma: float | None) -> Track:
+
+def read_track(
+    path: Path | str, camera: Camera, row_sigma: float | None, left_out: Sequence[int] = ()
+) -> Track:
     """Read a track file of any format (labsim/tracks) into a Track.
 
     Missing frames stay missing, and a frame without a position is not valid. Time = frame / frame rate unless the file brings
     its camera's own ``time_s``. Outliers are kept; ``fit_deceleration`` finds them. ``row_sigma`` (px) holds for every frame
     that the file gives no ``sigma_px`` for; where there is neither, the scatter about the local motion is measured and used.
+    left_out : numbers of frames whose rows are not used.
     Raises MeasurementError.
     """
-    return make_track(path, read_rows(path, camera), row_sigma)
+    return make_track(path, read_rows(path, camera), row_sigma, left_out)
 
 
-def make_track(path: Path | str, rows: TrackRows, row_sigma: float | None) -> Track:
-    """Rows of a file as a Track: error bars and gaps. ``row_sigma`` as for ``read_track``. Raises MeasurementError."""
+def find_left_out(path: Path | str, frame: np.ndarray, left_out: Sequence[int]) -> np.ndarray:
+    """(n,) bool, which of the numbers ``frame`` are left out. Raises MeasurementError where one of these is no frame."""
+    unknown = sorted(set(left_out) - set(frame.tolist()))
+    if unknown:
+        raise MeasurementError(
+            path,
+            "record.frames_left_out",
+            f"{unknown[0]} is no frame of the record; its frames are {frame[0]} to {frame[-1]}",
+        )
+    return np.isin(frame, list(left_out))
+
+
+def make_track(
+    path: Path | str, rows: TrackRows, row_sigma: float | None, left_out: Sequence[int] = ()
+) -> Track:
+    """Rows of a file as a Track: error bars and gaps. ``row_sigma``, ``left_out`` as for ``read_track``.
+
+    Raises MeasurementError.
+    """
     frame, row = rows.frame, rows.row
-    valid = np.isfinite(row)
+    without = find_left_out(path, frame, left_out)
+    placed = np.isfinite(row)
+    valid = placed & ~without
     if not valid.any():
         raise MeasurementError(path, "tip_row_px", "stands in no row; export the whole track again")
     warnings = list(rows.warnings)
-    missing = int(frame[-1] - frame[0] + 1 - len(frame)) + int(np.sum(~valid))
+    missing = int(frame[-1] - frame[0] + 1 - len(frame)) + int(np.sum(~placed))
     if missing:
         warnings.append("1 frame has no position" if missing == 1 else f"{missing} frames have no position")
     stated = np.isfinite(rows.sigma) & (rows.sigma > 0)
@@ -48,7 +73,10 @@ def make_track(path: Path | str, rows: TrackRows, row_sigma: float | None) -> Tr
         tip_row=row,
         sigma=np.where(stated, rows.sigma, np.nan if row_sigma is None else row_sigma),
         valid=valid,
-        reason=tuple("" if ok else "no position in the file" for ok in valid),
+        reason=tuple(
+            LEFT_OUT if out else "" if ok else "no position in the file"
+            for out, ok in zip(without, placed, strict=True)
+        ),
         warnings=tuple(warnings),
     )
 

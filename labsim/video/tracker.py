@@ -6,7 +6,8 @@ seen their distance, the length of the rigid rod, is measured, and the top end t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from .outline import Outline, Outliner
 from .rod import LOSSY_TAILS, Positions, follow_rod
 from .scene import NEAR_CEILING, Scene, survey_scene
 from .steadiness import LEAST_CORRECTED, Movement, describe_movement, follow_surface
+from .track_file import LEFT_OUT, find_left_out
 
 MOST_SMEAR = 1.5  # steps per frame; beyond, with a radius for what the fit takes for smear
 LEAST_LEAN = 3.0  # degrees; the tracker finds 0.1, and 3 turn 5 % of the force aside
@@ -50,16 +52,38 @@ class Tracking:
     scene: Scene
     lossy: bool = False
 
+    def moved(self, left: int, top: int) -> Tracking:
+        """The same in the whole picture, of which only the part from column ``left`` and row ``top`` was looked at.
+
+        ``scene`` stays in the pixels of that part.
+        """
+        return replace(
+            self,
+            track=replace(self.track, tip_row=self.track.tip_row + top),
+            x=self.x + left,
+            top_row=self.top_row + top,
+            surface=None if self.surface is None else replace(self.surface, value=self.surface.value + top),
+        )
+
 
 def track_projectile(
     frames: Frames,
     *,
     frame_rate: float | None = None,
     surface_row: float | None = None,
+    region: tuple[int, int, int, int] | None = None,
+    left_out: Sequence[int] = (),
     progress: Progress | None = None,
 ) -> Track:
     """Track of the tip; see ``follow_projectile`` for everything else that the video says."""
-    return follow_projectile(frames, frame_rate=frame_rate, surface_row=surface_row, progress=progress).track
+    return follow_projectile(
+        frames,
+        frame_rate=frame_rate,
+        surface_row=surface_row,
+        region=region,
+        left_out=left_out,
+        progress=progress,
+    ).track
 
 
 def follow_projectile(
@@ -67,14 +91,27 @@ def follow_projectile(
     *,
     frame_rate: float | None = None,
     surface_row: float | None = None,
+    region: tuple[int, int, int, int] | None = None,
+    left_out: Sequence[int] = (),
     progress: Progress | None = None,
 ) -> Tracking:
     """Follow the projectile through a video.
 
     frame_rate (Hz) overrides what the header says, not the camera's own stamps; surface_row (px) is where the tip
-    meets the dust if it is known better than from the picture. Raises MeasurementError for a video in which nothing
-    can be tracked.
+    meets the dust if it is known better than from the picture. region (left, top, right, bottom in px) is the only part
+    of the picture that is looked at; rows and columns stay those of the whole picture. left_out : the camera's numbers of
+    frames whose positions are not used. Raises MeasurementError for a video in which nothing can be tracked.
     """
+    if region is not None:
+        left, top = region[:2]
+        seen = follow_projectile(
+            frames.cut(region),
+            frame_rate=frame_rate,
+            surface_row=None if surface_row is None else surface_row - top,
+            left_out=left_out,
+            progress=progress,
+        )
+        return seen.moved(left, top)
     scene = survey_scene(frames, progress)
     count = len(scene.brightness)
     surface = scene.surface_row(0.5 * sum(scene.corridor))
@@ -121,6 +158,9 @@ def follow_projectile(
         warnings.append(
             f"{int(scene.duplicate.sum())} frames repeat the one before (first: {int(np.argmax(scene.duplicate))})"
         )
+    number = frames.numbers[:count].astype(np.int64)
+    without = find_left_out(frames.path, number, left_out)
+    reason = [LEFT_OUT if out else r for out, r in zip(without, reason, strict=True)]
     valid = np.isfinite(row) & np.array([r == "" for r in reason])
     if valid.sum() < 8:
         common = max(set(r for r in reason if r), key=reason.count, default="unknown")
@@ -145,7 +185,6 @@ def follow_projectile(
     if rejected:
         kinds = {r: reason.count(r) for r in reason if r}
         warnings.append("frames without a position: " + ", ".join(f"{n} {kind}" for kind, n in kinds.items()))
-    number = frames.numbers[:count].astype(np.int64)
     if frames.stamps is None and np.all(np.diff(number) == 1):
         number = _mend_clock(number, np.where(valid, row, np.nan), sigma, scene.duplicate, warnings)
     track = Track(

@@ -78,6 +78,19 @@ def test_a_layered_sample_is_no_noise(reduced_phantoms):
         assert getattr(sloping.errors, direction) == pytest.approx(getattr(flat.errors, direction), abs=0.1)
 
 
+def test_a_stated_axis_is_the_axis(tmp_path):
+    scan = Phantom(noise=0.0).write(tmp_path / "slices")
+    reduced = reduce_scan(replace(scan, axis=(52.5, 50.0)))
+    assert reduced.map.axis_px == (52.5, 50.0)
+    assert any(
+        "the axis is stated 1.9 voxels from the middle of the bead" in text for text in reduced.map.warnings
+    )
+    near = reduce_scan(replace(scan, axis=(54.3, 50.6)))
+    assert not any("axis is stated" in text for text in near.map.warnings)
+    with pytest.raises(MeasurementError, match=r"axis_px: \[200, 50\] is not inside the slices"):
+        reduce_scan(replace(scan, axis=(200.0, 50.0)))
+
+
 def test_axis_off_by_one_voxel_changes_the_map_by_little(tmp_path):
     phantom = Phantom(noise=0.0)
     scan = phantom.write(tmp_path / "slices")

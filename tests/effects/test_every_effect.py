@@ -23,10 +23,14 @@ USUAL = reference_campaign()
 # rods of one radius, so that the lower limit of hard_floor lies within reach of the small drop below
 CAMPAIGN = dataclasses.replace(
     USUAL,
-    drops=tuple(dataclasses.replace(each, projectile=USUAL.drops[0].projectile) for each in USUAL.drops),
+    drops=tuple(
+        dataclasses.replace(each, projectile=USUAL.drops[0].projectile, position=(2.0 * k, 0.0))
+        for k, each in enumerate(USUAL.drops)
+    ),
 )
 EFFECTS = list_effects(CAMPAIGN)
-PHYSICS = [name for name, effect in EFFECTS.items() if effect.costs_runs]
+PUSHES = {"partial_drainage"}  # of pushes alone: tests/inference/test_pushes.py
+PHYSICS = [name for name, effect in EFFECTS.items() if effect.costs_runs and name not in PUSHES]
 RADIUS, SPACING, PIXEL = 5.0e-4, 1.25e-4, 2.0e-5
 NAMES = {
     "strength_rate": {"eta", "n"},
@@ -41,6 +45,8 @@ NAMES = {
     "density_gradient": {"gradient"},
     "hard_floor": {"depth"},
     "sample_drift": {"relative_change"},
+    "strength_trend": {"growth", "azimuth"},
+    "partial_drainage": {"gain", "half_speed"},
     "contact_friction": {"mu"},
     "side_friction": {"force_per_length"},
     "gravity": {"g"},
@@ -212,7 +218,7 @@ def test_many_random_values_at_several_speeds(name: str) -> None:
         predict_at_random(name, rng, impact_speed=float(rng.uniform(0.12, 1.2)), depth=None, duration=8e-3)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name not in PUSHES])
 def test_the_stated_direction_holds(name: str) -> None:
     effect, base = EFFECTS[name], make_setting(name)
     values = in_steps(name, 1.0, base)
@@ -235,7 +241,9 @@ def test_the_stated_direction_holds(name: str) -> None:
         assert after["blur"] > before["blur"] == 0.0
 
 
-@pytest.mark.parametrize("name", [name for name, effect in EFFECTS.items() if effect.parameters])
+@pytest.mark.parametrize(
+    "name", [name for name, effect in EFFECTS.items() if effect.parameters and name not in PUSHES]
+)
 def test_the_tangent_at_null_does_not_hang_on_its_step(name: str) -> None:
     effect, base = EFFECTS[name], make_setting(name)
     parameter = effect.amplitudes[0]
@@ -340,9 +348,17 @@ def test_values_outside_the_limits_are_refused(name: str) -> None:
 def test_every_effect_says_whether_it_applies(name: str) -> None:
     effect: Effect = EFFECTS[name]
     reason = effect.applies(CAMPAIGN)
-    assert (reason != "") == (name in {"gravity", "planar_geometry", "static_strength"})
+    assert (reason != "") == (name in {"gravity", "planar_geometry", "static_strength", *PUSHES})
     bare = dataclasses.replace(
         CAMPAIGN, gravity=0.0, geometry="planar", scans=(), drops=CAMPAIGN.drops[:3]
     )  # in the plane, three drops, no CT
-    silent = {"ct_scale", "ct_blur", "sample_drift", "side_friction", "static_strength"}
+    silent = {
+        "ct_scale",
+        "ct_blur",
+        "sample_drift",
+        "side_friction",
+        "static_strength",
+        "strength_trend",
+        *PUSHES,
+    }
     assert (effect.for_campaign(bare).applies(bare) != "") == (name in silent)

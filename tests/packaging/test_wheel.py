@@ -103,7 +103,7 @@ def test_an_installed_wheel_has_its_pages(installed: Path, tmp_path: Path) -> No
 
 
 def test_an_installed_wheel_works_alone(installed: Path, tmp_path: Path) -> None:
-    code = "import labsim, labsim.cli.demo as d; print(labsim.__file__); print(d.find_data('guettler2009'))"
+    code = "import labsim; print(labsim.__file__); print(labsim.example('guettler2009'))"
     environment = {**os.environ, "PYTHONPATH": str(installed)}
     out = subprocess.run(
         [sys.executable, "-c", code],

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import shutil
 from pathlib import Path
 
 import laws
@@ -90,22 +88,6 @@ def published(place: Path) -> Path:
     folder.mkdir()
     write_diagnosis(diagnose_summary(calibration, store, workers=1), folder)
     return folder
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Headless Chromium of the system, driven by Playwright; the test is skipped where either is missing."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    named = os.environ.get("LABSIM_CHROMIUM")
-    chromium = (
-        named or shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    )
-    if chromium is None:
-        pytest.skip("no Chromium here (Debian: apt install chromium; or name it in LABSIM_CHROMIUM)")
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 def load(folder: Path, name: str) -> dict:

@@ -210,6 +210,8 @@ def test_a_single_drop_is_calibrated(calibrated: Path) -> None:
     calibration = json.loads((calibrated / "calibration.json").read_text())
     assert f"{calibration['p_m_Pa']['q50'] / 1e3:.3f} kPa" in page.text
     assert (calibrated / "fit.png").stat().st_size > 5000
+    assert (calibrated / "posterior.png").stat().st_size > 5000
+    assert not (calibrated / "corner.png").exists(), "p_m alone has no other parameter beside it"
 
 
 def test_published_figures(published: Path) -> None:

@@ -395,3 +395,38 @@ def test_nothing_to_track() -> None:
         follow_projectile(make_frames(noise))
     with pytest.raises(MeasurementError, match="at least 12"):
         follow_projectile(make_frames(noise[:5]))
+
+
+def test_only_a_region_is_looked_at() -> None:
+    """A darker and larger thing that falls beside the rod is taken for it, unless the region shuts it out."""
+    recording, pictures, rows, _ = record()
+    disturbed = [picture.copy() for picture in pictures]
+    wide = np.concatenate([np.stack(disturbed), np.full((len(disturbed), 384, 100), 190, np.uint8)], axis=2)
+    for frame, picture in enumerate(wide):
+        picture[: 20 + 2 * frame, 140:215] = 30
+        picture[282:, 128:] = 38
+    frames = make_frames(list(wide))
+    options = {"surface_row": recording.surface_row, "region": (8, 4, 119, 380)}
+    seen = follow_projectile(frames, **options)
+    assert seen.track.valid.all()
+    assert np.abs(seen.track.tip_row - rows).max() < 0.15
+    assert abs(np.nanmedian(seen.x) - recording.column) < 1.0
+    assert seen.surface is not None and abs(seen.surface.value - recording.surface_row) < 0.5
+    try:
+        without = follow_projectile(frames, surface_row=recording.surface_row).track
+        assert not np.nanmax(np.abs(without.tip_row - rows)) < 5.0
+    except MeasurementError:
+        pass  # or nothing can be followed at all
+    with pytest.raises(MeasurementError, match=r"region_px.*columns go to 227, rows to 383"):
+        follow_projectile(frames, region=(0, 0, 300, 100))
+
+
+def test_frames_that_are_left_out() -> None:
+    _, pictures, _, _ = record()
+    seen = follow_projectile(
+        make_frames(pictures, numbers=np.arange(90) + 1000), left_out=(1003, 1010), surface_row=280.0
+    )
+    assert seen.track.frame[~seen.track.valid].tolist() == [1003, 1010]
+    assert {reason for reason in seen.track.reason if reason} == {"left out in drop.toml"}
+    with pytest.raises(MeasurementError, match=r"frames_left_out: 3 is no frame.*1000 to 1089"):
+        follow_projectile(make_frames(pictures, numbers=np.arange(90) + 1000), left_out=(3,))

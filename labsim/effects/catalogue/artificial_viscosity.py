@@ -26,8 +26,8 @@ leaves = (
     "term does not; run.json says which share of the energy it took."
 )
 references = (
-    "Monaghan (1992), Annu. Rev. Astron. Astrophys. 30, 543",
-    "Geretshauser, Speith, Güttler, Krause & Blum (2010), A&A 513, A58: choice of α",
+    "Monaghan (1992)",
+    "Geretshauser, Speith, Güttler, Krause & Blum (2010): choice of α",
 )
 expect = {"penetration_depth": -1}
 

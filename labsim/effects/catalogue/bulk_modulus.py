@@ -34,8 +34,8 @@ leaves = (
     "few percent for a ten times smaller K0, almost like a smaller p_m."
 )
 references = (
-    "Güttler, Krause, Geretshauser, Speith & Blum (2009), ApJ 701, 130",
-    "Geretshauser, Speith, Güttler, Krause & Blum (2010), A&A 513, A58: K calibrated by the bouncing of dust",
+    "Güttler, Krause, Geretshauser, Speith & Blum (2009b)",
+    "Geretshauser, Speith, Güttler, Krause & Blum (2010): K calibrated by the bouncing of dust",
 )
 expect = {"penetration_depth": -1, "stopping_time": -1}
 

@@ -26,9 +26,7 @@ leaves = (
     "Shallower drops, like a larger p_m, but less dust pushed aside and more carried down in front of the tip; it matters "
     "most while the tip is only half immersed."
 )
-references = (
-    "Katsuragi & Durian (2007), Nature Physics 3, 420: friction in the drag on a penetrating sphere",
-)
+references = ("Katsuragi & Durian (2007): friction in the drag on a penetrating sphere",)
 expect = {"penetration_depth": -1, "stopping_time": -1}
 
 

@@ -34,9 +34,7 @@ leaves = (
     "The deeper the drop, the larger the change: fast and heavy drops deviate from what slow ones say of p_m, in the "
     "opposite order to a crust. Undisturbed dust in the CT shows it."
 )
-references = (
-    "Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503: layer-wise growth of random ballistic deposits",
-)
+references = ("Blum & Schräpler (2004): layer-wise growth of random ballistic deposits",)
 expect = {"penetration_depth": -1, "stopping_time": -1}
 
 

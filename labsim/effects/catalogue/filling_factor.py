@@ -32,9 +32,7 @@ leaves = (
     "up almost entirely; undisturbed dust in the CT shows it directly."
 )
 remedy = "weigh the sample again: these data ask for filling_factor = {value:.4f} under [sample]"
-references = (
-    "Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503: filling factor of random ballistic deposits",
-)
+references = ("Blum & Schräpler (2004): filling factor of random ballistic deposits",)
 expect = {"penetration_depth": -1, "stopping_time": -1}
 
 

@@ -21,7 +21,7 @@ leaves = (
     "Slow, large and heavy drops go too deep: the extra depth is g times the square of the stopping time, the same at "
     "every speed (20 um for 1 mm, 160 um for 3 mm)."
 )
-references = ("Katsuragi & Durian (2007), Nature Physics 3, 420: weight in the equation of motion",)
+references = ("Katsuragi & Durian (2007): weight in the equation of motion",)
 expect = {"penetration_depth": 1, "stopping_time": 1}
 
 

@@ -5,7 +5,7 @@ changes nothing. The effect is far from linear: the depth changes by 0.1 % where
 point of the tip, by 1 to 2 % at 0.4 radii, by 4 to 8 % at none (p_m 1300 Pa, 0.5 and 1 m/s, five spacings a radius).
 """
 
-from labsim.effects import Parameter, Uniform, deepest_expected, list_thrown
+from labsim.effects import Parameter, Uniform, all_pushed, deepest_expected, list_thrown
 from labsim.sph.particles import WALL_LAYERS
 
 title = "The sample is shallower than stated"
@@ -37,10 +37,12 @@ leaves = (
     "where the tip comes within half its radius of the floor."
 )
 remedy = "use a deeper sample, or slower drops: the bottom is felt {value:.4g} m below the surface"
-references = (
-    "Seguin, Bertho & Gondret (2008), Phys. Rev. E 78, 010301: influence of confinement on granular penetration by impact",
-)
+references = ("Seguin, Bertho & Gondret (2008): influence of confinement on granular penetration by impact",)
 expect = {"penetration_depth": 1}
+
+
+def applies(campaign):
+    return "every projectile is pushed" if all_pushed(campaign) else ""
 
 
 def change_setting(setting, values, place):

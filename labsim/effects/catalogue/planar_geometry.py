@@ -15,7 +15,7 @@ leaves = (
     "p_m several times too large or too small and a wrong factor between depth and stopping time: the dust can go round a "
     "sphere on all sides, and its area grows with the square of the depth, a cylinder's with the root."
 )
-references = ("Güttler et al. (2009), Powders and Grains: the factor 8/(3π) between cylinder and sphere",)
+references = ("Güttler et al. (2009): the factor 8/(3π) between cylinder and sphere",)
 expect = {"penetration_depth": -1, "stopping_time": -1}
 
 

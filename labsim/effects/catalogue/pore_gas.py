@@ -26,7 +26,7 @@ leaves = (
     "different change of depth with speed. It goes away when the chamber is pumped longer."
 )
 references = (
-    "Royer et al. (2007), Phys. Rev. Lett. 99, 038003; Homan & van der Meer (2016): gas in granular impact",
+    "Royer et al. (2007): gas in granular impact",
     "Ideal gas at constant temperature in the pore volume 1 - φ",
 )
 expect = {"penetration_depth": -1}

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from labsim.effects import LogNormal, Parameter
+from labsim.effects import LogNormal, Parameter, all_pushed
 
 title = "The projectiles' mass is not the stated mass"
 kind = "projectile"
@@ -24,8 +24,12 @@ remedy = (
     "weigh the projectiles again: these drops ask for a mass_mg that is {value:.3f} times what "
     "drop.toml states"
 )
-references = ("Güttler et al. (2009), Powders and Grains: D grows with m v/A",)
+references = ("Güttler et al. (2009): D grows with m v/A",)
 expect = {"penetration_depth": 1, "stopping_time": 1}
+
+
+def applies(campaign):
+    return "every projectile is pushed" if all_pushed(campaign) else ""
 
 
 def change_setting(setting, values, place):

@@ -1,13 +1,14 @@
 """The strength drifts from drop to drop in the order they were made: p_m (1 + relative_change s), s from -1/2 to 1/2.
 
-p_m itself then is the strength in the middle of the series. Scans are taken as made in the middle.
+Of another law than the dust's, what is calibrated of it drifts. p_m itself then is the strength in the middle of the series.
+Scans are taken as made in the middle.
 """
 
+from labsim.calibrated import scale_value
 from labsim.effects import Normal, Parameter
 
 title = "The strength drifts from drop to drop"
 kind = "sample"
-needs = ("p_m",)
 parameters = (
     Parameter(
         "relative_change",
@@ -23,7 +24,7 @@ parameters = (
 )
 leaves = "Residuals of the depth that follow the order of the drops and not speed or size."
 remedy = "keep the samples alike: the same storage and deposit for all, drops in a mixed order"
-references = ("Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503: strength depends on preparation",)
+references = ("Blum & Schräpler (2004): strength depends on preparation",)
 expect = {"penetration_depth": -1}  # of the last drop
 
 
@@ -37,4 +38,4 @@ def applies(campaign):
 
 def change_setting(setting, values, place):
     factor = 1.0 + values["relative_change"] * place.sequence_fraction
-    return setting.replace(material=setting.material.replace(p_m=setting.material.p_m * factor))
+    return setting.replace(material=scale_value(setting.material, factor))

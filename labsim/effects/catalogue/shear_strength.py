@@ -30,8 +30,8 @@ leaves = (
     "strength lets the dust flow aside instead of being compacted."
 )
 references = (
-    "Sirono (2004), Icarus 167, 431: Y = √(Σ|T|)",
-    "Seizinger, Speith & Kley (2013), A&A 559, A19: shear strength differs significantly from earlier models",
+    "Sirono (2004): Y = √(Σ|T|)",
+    "Seizinger, Speith & Kley (2013): shear strength differs significantly from earlier models",
 )
 expect = {"penetration_depth": -1, "stopping_time": -1}
 

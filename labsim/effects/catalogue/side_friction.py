@@ -3,7 +3,7 @@
 Stated for a rod of 1 mm diameter. It acts on the circumference, so it is scaled with the radius; beads have no side.
 """
 
-from labsim.effects import HalfNormal, Parameter
+from labsim.effects import HalfNormal, Parameter, all_pushed
 from labsim.sph.profile import has_shaft
 from labsim.sph.tips import make_profile
 
@@ -33,6 +33,8 @@ expect = {"penetration_depth": -1, "stopping_time": -1}
 
 
 def applies(campaign):
+    if all_pushed(campaign):
+        return "every projectile is pushed"
     if campaign.geometry == "planar":
         return "the nominal model is planar, and a lying cylinder has no side"
     if not any(has_shaft(make_profile(drop.projectile)) for drop in campaign.drops):

@@ -22,7 +22,7 @@ leaves = (
     "Compression and shear tests lie above or below the curve that the drops ask for, by one factor at all filling factors. "
     "Drops and scans do not change."
 )
-references = ("Güttler et al. (2009), Powders and Grains: p_m of static tests and of drops",)
+references = ("Güttler et al. (2009): p_m of static tests and of drops",)
 expect = {"penetration_depth": 0, "stopping_time": 0, "compacted_volume": 0}
 
 

@@ -29,8 +29,8 @@ leaves = (
     "and the densest dust below the tip stays looser. Only the densest part of the CT tells it from p_m."
 )
 references = (
-    "Güttler et al. (2009), Powders and Grains, eq. 6",
-    "Meisner et al. (2012), arXiv:1207.3669: saturation of compression in one direction at φ = 0.31",
+    "Güttler et al. (2009), eq. 6",
+    "Meisner et al. (2012): saturation of compression in one direction at φ = 0.31",
 )
 expect = {"penetration_depth": 1, "stopping_time": 1}
 

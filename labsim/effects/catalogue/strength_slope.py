@@ -28,7 +28,7 @@ leaves = (
     "Dust of φ below (φ1 + φ2)/2 is softer for a larger Δ, denser dust harder: depths trade against p_m almost entirely, "
     "but the compacted volume above φ = 0.2 grows and its densest part with it. The CT decides, the tracks hardly do."
 )
-references = ("Güttler et al. (2009), Powders and Grains, eq. 6 and its two sets of parameters",)
+references = ("Güttler et al. (2009), eq. 6 and its two sets of parameters",)
 expect = {"penetration_depth": 1, "stopping_time": 1}
 
 

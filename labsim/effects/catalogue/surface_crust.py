@@ -43,7 +43,7 @@ leaves = (
 )
 remedy = "take the crust off, or keep it in the model: labsim simulate --model model.toml"
 references = (
-    "Weidling, Güttler, Blum & Brauer (2009), arXiv:0902.3082: compaction of surfaces by handling and repeated impact",
+    "Weidling, Güttler, Blum & Brauer (2009): compaction of surfaces by handling and repeated impact",
 )
 expect = {"penetration_depth": -1, "stopping_time": -1}
 

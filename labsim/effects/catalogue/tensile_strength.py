@@ -24,9 +24,9 @@ leaves = (
     "tracks it looks like another p_m."
 )
 references = (
-    "Güttler et al. (2009), Powders and Grains, eq. 5",
-    "Blum & Schräpler (2004), Phys. Rev. Lett. 93, 115503",
-    "Meisner et al. (2012), arXiv:1207.3669: Brazilian tests of irregular quartz",
+    "Güttler et al. (2009), eq. 5",
+    "Blum & Schräpler (2004)",
+    "Meisner et al. (2012): Brazilian tests of irregular quartz",
 )
 expect = {"penetration_depth": -1, "stopping_time": -1}
 

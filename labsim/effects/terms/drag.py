@@ -8,11 +8,11 @@ PLACE = "force of speed"
 TERMS = (
     Term(
         "inertial_drag", "a drag that grows with the square of the speed", PLACE, "Pa s²/m²", "v²",
-        lambda v: v**2, "Momentum given to the dust ahead: Katsuragi & Durian 2007, Nature Physics 3, 420",
+        lambda v: v**2, "Momentum given to the dust ahead: Katsuragi & Durian (2007)",
     ),
     Term(
         "viscous_drag", "a drag that grows with the speed", PLACE, "Pa s/m", "v",
-        lambda v: v, "Gas in the pores, and the published F = A c v: Güttler et al. 2009, ApJ 701, 130",
+        lambda v: v, "Gas in the pores, and the published F = A c v: Güttler et al. (2009b)",
     ),
     Term(
         "root_drag", "a drag that grows with the root of the speed", PLACE, "Pa (s/m)^½", "√v",

@@ -8,11 +8,11 @@ PLACE = "force of depth"
 TERMS = (
     Term(
         "constant_pressure", "a pressure alike at all depths", PLACE, "Pa", "1",
-        lambda z: np.ones_like(z), "Cohesion, a yield stress: Uehara et al. 2003, Phys. Rev. Lett. 90, 194301",
+        lambda z: np.ones_like(z), "Cohesion, a yield stress: Uehara et al. (2003)",
     ),
     Term(
         "depth_spring", "a pressure that grows with the depth", PLACE, "Pa", "z/a",
-        lambda z: z, "Friction under the weight of the dust: Katsuragi & Durian 2007, Nature Physics 3, 420",
+        lambda z: z, "Friction under the weight of the dust: Katsuragi & Durian (2007)",
     ),
     Term(
         "depth_square", "a pressure that grows with the square of the depth", PLACE, "Pa", "(z/a)²",

@@ -39,6 +39,7 @@ class AccelerationModel:
     table: ResponseTable
     start: Instant
     camera: None = None
+    unit: str = "m/s^2"
 
     @property
     def radius(self) -> float:
@@ -125,6 +126,10 @@ class AccelerationModel:
             f"scale {each.column} {each.range:g}": output * self.observed.sensors[:, k] * each.scale_sigma
             for k, each in enumerate(accelerometer.sensors)
         }
+
+    def slope(self, here: FloatArray) -> FloatArray:
+        """What the solver may be off by a share of from shallow to deep drops, m/s²."""
+        return np.maximum(here, 0.0)
 
     def find_solver_noise(self, here: FloatArray, stop: float) -> FloatArray:
         """(n, n) root of the covariance of what is particle noise in the force, by columns."""

@@ -117,6 +117,12 @@ class DropModel:
             "contact offset": np.full(here.size, contact * self.radius),
         }
 
+    unit = "m"
+
+    def slope(self, here: FloatArray) -> FloatArray:
+        """What the solver may be off by a share of from shallow to deep drops, m."""
+        return np.maximum(here, 0.0)
+
     def find_solver_noise(self, here: FloatArray, stop: float) -> FloatArray:
         """(n, 0): depths have none that is not smooth."""
         return np.zeros((here.size, 0))

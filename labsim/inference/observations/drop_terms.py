@@ -16,7 +16,9 @@ from ...sph import DropSetting
 from ..forward import Instant
 from .acceleration_model import AccelerationModel
 from .drop_model import FREE, SPEED_WIDTH, DropModel
+from .push_model import PushModel
 
+RecordModel = DropModel | AccelerationModel | PushModel  # of what one instrument records of one drop or push
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error
 MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
@@ -95,7 +97,7 @@ def measure_distances(drops: Sequence[tuple[float, float, float]]) -> FloatArray
 
 
 def linearise_drop(
-    model: DropModel | AccelerationModel,
+    model: RecordModel,
     instant: Instant,
     log_p_m: float,
     nominal: Probe,
@@ -151,7 +153,7 @@ def linearise_drop(
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
         **model.share(differ, here, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
-        "numerical slope": np.maximum(here, 0.0) * (reach - USUAL_DEPTH) * terms.numerical_slope,
+        "numerical slope": model.slope(here) * (reach - USUAL_DEPTH) * terms.numerical_slope,
         "numerical strength": by_strength * terms.numerical_strength,
     }
 
@@ -163,7 +165,7 @@ def linearise_drop(
         reach,
         math.log(model.radius),
         math.log(mass.mass / model.radius**3),
-        "m" if model.camera is not None else "m/s^2",
+        model.unit,
     )
     drop = DropTerms(
         model.data - here,
@@ -181,7 +183,7 @@ def linearise_drop(
     return replace(drop, residual=drop.residual + drop.local @ pull)
 
 
-def list_speeds(model: DropModel | AccelerationModel) -> list[tuple[float, float]]:
+def list_speeds(model: RecordModel) -> list[tuple[float, float]]:
     """ln of the impact speed with its error, from each thing beside the motion in the dust that says it."""
     drop, found = model.observed.drop, []
     height = drop.height

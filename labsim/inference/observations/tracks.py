@@ -20,9 +20,16 @@ from ...records import FloatArray
 from ..blocks import Block
 from ..forward import Instant
 from . import RunFeatures
-from .acceleration_model import AccelerationModel
-from .drop_model import WIDTHS, DropModel
-from .drop_terms import DropTerms, NumericalError, Probe, Terms, linearise_drop, measure_distances
+from .drop_model import WIDTHS
+from .drop_terms import (
+    DropTerms,
+    NumericalError,
+    Probe,
+    RecordModel,
+    Terms,
+    linearise_drop,
+    measure_distances,
+)
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,7 @@ class Tracks:
     Nuisances : (drops, 3) contact time (s), ln of the impact speed, offset of the surface row (m).
     """
 
-    models: tuple[DropModel | AccelerationModel, ...]
+    models: tuple[RecordModel, ...]
     features: tuple[RunFeatures, ...]
     kind: str = "drops"
     name: str = "drops"

@@ -1,0 +1,68 @@
+"""Cone soundings in the lines of Nordic loggers (``.cpt``): ``D=10.02,QC=0.8213,FS=12.1,U=301.5,...``, one a depth.
+
+D in m, QC (tip) in MPa, FS (sleeve) and U (pore water behind the cone) in kPa; MA= in the heading is the cone's area ratio a.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import LabsimError, MeasurementError
+from ..records import FloatArray, Gauge
+from ..tracks.lines import read_lines
+from . import Columns
+
+SUFFIXES = (".cpt",)
+FIELD = re.compile(r"(?:^|,)([A-Z%]+)=([^,]*)")
+KEYS = ("D", "QC", "FS", "U")
+
+
+def read(path: Path, gauge: Gauge, section: float) -> Columns:
+    """section is of no use: the record has pressures. Raises MeasurementError."""
+    try:
+        lines = read_lines(path)
+    except LabsimError as trouble:
+        raise MeasurementError(path, "record.file", trouble.message) from None
+    area_ratio = math.nan
+    rows: list[list[float]] = []
+    for number, text in lines:
+        fields = dict(FIELD.findall(text))
+        if "MA" in fields and not rows:
+            area_ratio = _read(path, number, "MA", fields)
+        if "D" in fields and "QC" in fields:
+            rows.append([_read(path, number, key, fields) for key in KEYS])
+    if not rows:
+        raise MeasurementError(
+            path, "record.file", "has no line with D= and QC=; name a sounding's .cpt file"
+        )
+    depth, tip, sleeve, pore = np.array(rows).T
+    pressure = tip * 1e6
+    if np.isfinite(pore).any():
+        if not 0.0 <= area_ratio <= 1.0:
+            raise MeasurementError(
+                path, "MA", f"is {area_ratio:g}, not an area ratio between 0 and 1; write it into the heading"
+            )
+        pressure = (
+            pressure + (1.0 - area_ratio) * pore * 1e3
+        )  # a row without U is lost: nobody knows its correction
+    return Columns(depth, pressure, _kept(sleeve), _kept(pore))
+
+
+def _kept(values: FloatArray) -> FloatArray:
+    return values * 1e3 if np.isfinite(values).any() else np.empty(0)
+
+
+def _read(path: Path, number: int, key: str, fields: dict[str, str]) -> float:
+    text = fields.get(key, "")
+    if text == "":
+        return math.nan
+    try:
+        return float(text)
+    except ValueError:
+        raise MeasurementError(
+            path, f"line {number}", f"{key}={text[:40]!r} is not a number; correct or remove the line"
+        ) from None
