@@ -136,7 +136,7 @@ def calibrate(
     ``labsim.inference.summary.calibrate_summary`` for published figures. Raises LabsimError.
     """
     read = _read(campaign)
-    if _has_tracks(read):
+    if read.has_records:
         from .inference.calibrate import calibrate as calibrate_tracks
 
         return calibrate_tracks(read, parameters, store=_open(store), **settings)
@@ -154,7 +154,7 @@ def diagnose(
     (seed, cells). Raises LabsimError.
     """
     read, opened = _read(campaign), _open(store)
-    if _has_tracks(read):
+    if read.has_records:
         from .diagnosis.campaign import diagnose_campaign
 
         return diagnose_campaign(read, opened, **settings)
@@ -181,24 +181,12 @@ def write_report(
     Path
         The folder. ``report.html`` in it is one file with all pictures (of published figures: of a diagnosis only).
     """
-    from .cli.calibrate import write_calibration
-    from .cli.diagnose import write_diagnosis
-    from .cli.measured import write_measured_calibration, write_measured_diagnosis
-    from .diagnosis.campaign import Diagnosis
-    from .diagnosis.summary import SummaryDiagnosis
-    from .inference.calibrate import Calibration
+    from .report.outputs import write_result
     from .results import SAID
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    if isinstance(found, Diagnosis):
-        lines = write_measured_diagnosis(found, folder)[1]
-    elif isinstance(found, Calibration):
-        lines = write_measured_calibration(found, folder)[1]
-    elif isinstance(found, SummaryDiagnosis):
-        lines = write_diagnosis(found, folder)[1]
-    else:
-        lines = write_calibration(found, folder)[1]
+    _, lines = write_result(found, folder)
     (folder / SAID).write_text(lines + "\n", encoding="utf-8")
     return folder
 
@@ -245,7 +233,3 @@ def _open(store: Path | str | None) -> RunStore:
     from .inference.runs import RunStore
 
     return RunStore(store)
-
-
-def _has_tracks(campaign: Campaign) -> bool:
-    return any(drop.record.kind != "summary" for drop in campaign.drops)

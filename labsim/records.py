@@ -276,6 +276,11 @@ class Campaign:
     calibrated: str = "p_m"  # the parameter of the law that p_m_range is the range of
     strength_tests: tuple[StrengthTest, ...] = ()
 
+    @property
+    def has_records(self) -> bool:
+        """Whether a drop was recorded; of the others only published figures are known."""
+        return any(drop.record.kind != "summary" for drop in self.drops)
+
 
 @dataclass(frozen=True)
 class Track:

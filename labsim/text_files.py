@@ -1,4 +1,4 @@
-"""TOML and JSON that somebody else wrote: read, or refused in one line, within seconds, whatever the file is.
+"""TOML and JSON as files. What somebody else wrote is read, or refused in one line, within seconds, whatever the file is.
 
 Only files are opened (reading a fifo waits for ever, a device may have no end), only as much as a sound one can hold, and what
 the parsers of the standard library let through is caught here: values nested too deep, integers beyond 64 bits.
@@ -7,6 +7,8 @@ the parsers of the standard library let through is caught here: values nested to
 from __future__ import annotations
 
 import json
+import math
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -43,6 +45,30 @@ def load_json(path: Path, error: type[LabsimError], remedy: str) -> Any:
         raise error(path, "", "is nested too deep; it is not of labsim") from None
     except ValueError as trouble:
         raise error(path, "", f"is not JSON: {trouble}") from None
+
+
+def write_json(path: Path, values: dict[str, Any]) -> Path:
+    """Write a summary file; a number that is not finite becomes null, and a killed process leaves no half file."""
+    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    aside.write_text(
+        json.dumps(make_finite(values), indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        encoding="utf-8",
+    )
+    os.replace(aside, path)
+    return path
+
+
+def make_finite(value: Any) -> Any:
+    """As JSON can hold it: arrays as lists, paths as texts, a number that is not finite as null."""
+    if isinstance(value, dict):
+        return {str(key): make_finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [make_finite(item) for item in value]
+    if hasattr(value, "tolist"):
+        return make_finite(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
 
 
 def _read(path: Path, most: int, error: type[LabsimError], remedy: str) -> str:

@@ -22,8 +22,8 @@ FLOORS = [
     {"diagnosis", "inspection"},
     {"report"},
     {"view", "results"},
-    {"cli"},
     {"api"},
+    {"cli"},
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

@@ -30,13 +30,10 @@ from ..errors import LabsimError
 from ..inference.processes import silence_numerics
 from . import _provenance, options
 
-NOT_COMMANDS = {"options", "measured"}  # shared by commands
+NOT_COMMANDS = {"options"}  # shared by commands
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 for _name in THREADS:  # before numpy: the same sums on every machine, and no threads that fight the workers
     os.environ.setdefault(_name, "1")
-os.environ.setdefault(
-    "MPLBACKEND", "Agg"
-)  # commands draw into files; a notebook keeps its own way to show a picture
 
 STOPPED = 130  # what shells say of a command that was interrupted
 TERMINATED = 143  # and of one that was asked to end: 128 and the signal's number, 15

@@ -10,6 +10,8 @@ import typer
 from ..campaign import read_campaign
 from ..effects import list_effects
 from ..effects.model import read_model
+from ..inference.calibrate import Calibration
+from ..inference.calibrate import calibrate as calibrate_drops
 from ..inference.runs import RunStore
 from ..inference.summary import SummaryCalibration
 from . import options
@@ -22,7 +24,6 @@ from ._published import (
     calibrate_figures,
     refuse_options,
 )
-from .measured import calibrate_measured, has_tracks
 
 
 def calibrate(
@@ -49,15 +50,15 @@ def calibrate(
 ) -> None:
     """Find p_m from a campaign: posterior.nc, calibration.json, fit.png, and corner.png of several parameters."""
     read = read_campaign(campaign)
-    tracks = has_tracks(read)
-    if tracks:
+    if read.has_records:
         refuse_options(
             read, PUBLISHED_ONLY, use=use, planar_correction=planar_correction, bulk_modulus=bulk_modulus
         )
     else:
         refuse_options(read, TRACKS_ONLY, parameters=parameters, model=model)
     extended = read_model(model, list_effects(read)) if model is not None else None
-    folder = options.make_output_folder(out, campaign, "calibrate")
+    folder, opened = options.make_output_folder(out, campaign, "calibrate"), RunStore(store)
+    found: Calibration | SummaryCalibration
     with options.show_progress(quiet) as progress:
         settings: dict[str, Any] = {
             "workers": workers,
@@ -65,14 +66,17 @@ def calibrate(
             "seed": seed,
             "progress": progress,
         }
-        if tracks:
+        if read.has_records:
             named = [name.strip() for name in (parameters or "").split(",")]
-            names = tuple(name for name in named if name not in ("", "p_m"))
-            settings["model"] = extended
-            summary, lines = calibrate_measured(read, folder, RunStore(store), names, settings)
+            names = ("p_m", *(name for name in named if name not in ("", "p_m")))
+            found = calibrate_drops(
+                read, names, store=opened, backend=folder / "chain.h5", model=extended, **settings
+            )
         else:
-            found = calibrate_figures(read, RunStore(store), use, planar_correction, bulk_modulus, settings)
-            summary, lines = write_calibration(found, folder)
+            found = calibrate_figures(read, opened, use, planar_correction, bulk_modulus, settings)
+        from ..report.outputs import write_result  # matplotlib is slow to import and only needed at the end
+
+        summary, lines = write_result(found, folder, options.write_json)
     options.finish(
         summary,
         f"{lines}\n\nwritten to {options.shorten_path(folder)}",
@@ -80,17 +84,3 @@ def calibrate(
         quiet=quiet,
         folder=folder,
     )
-
-
-def write_calibration(found: SummaryCalibration, folder: Path) -> tuple[dict, str]:
-    """Files of a calibration; its summary and the lines for people."""
-    from ..report.summary_figures import draw_corner, draw_fit
-    from ..report.tables import calibration_lines, calibration_summary
-
-    summary = calibration_summary(found)
-    options.write_json(folder / "calibration.json", summary)
-    (folder / "posterior.nc").unlink(missing_ok=True)
-    found.posterior.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
-    draw_corner(found, folder / "corner.png")
-    draw_fit(found, folder / "fit.png")
-    return summary, calibration_lines(found)

@@ -13,7 +13,6 @@ from ..examples import example
 from ..inference.runs import RunStore
 from ..inference.summary import calibrate_summary
 from . import options
-from .diagnose import write_diagnosis
 
 
 def demo(
@@ -38,8 +37,10 @@ def demo(
             campaign, opened, workers=workers, scheduler=scheduler, seed=seed, progress=progress
         )
         found = diagnose_summary(calibration, opened, workers=workers, scheduler=scheduler, progress=progress)
-    summary, lines = write_diagnosis(found, folder)
+    from ..report.outputs import write_result
     from ..report.tables import calibration_lines
+
+    summary, lines = write_result(found, folder, options.write_json)
 
     made = "\n".join(f"  {path.name}" for path in sorted(folder.iterdir()) if not path.name.startswith("."))
     counted = (

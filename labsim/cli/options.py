@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import sys
 import time
@@ -15,6 +14,7 @@ from typing import Annotated, Any, Protocol
 
 import typer
 
+from .. import text_files
 from ..errors import LabsimError
 from ..results import SAID
 from . import _provenance
@@ -107,17 +107,13 @@ def output_folder() -> Path | None:
 
 
 def write_json(path: Path, summary: dict[str, Any], item: str | None = None) -> Path:
-    """Write a summary file; a number that is not finite becomes null, and a killed command leaves no half file.
+    """Write a summary file with ``made_by``: command, versions, solver, inputs and seed, which ``labsim rerun`` goes by.
 
-    The summary gets ``made_by``: command, versions, solver, inputs and seed, which ``labsim rerun`` goes by;
-    ``item`` names the input of one measurement of many.
+    item : the input of one measurement of many.
     """
     if (made_by := _provenance.describe()) is not None or item is not None:
         summary[_provenance.KEY] = {**(made_by or {}), **({"item": item} if item else {})}
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    aside.write_text(json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-    os.replace(aside, path)
-    return path
+    return text_files.write_json(path, summary)
 
 
 def shorten_path(path: Path) -> str:
@@ -136,21 +132,9 @@ def finish(
     if folder is not None:
         (folder / SAID).write_text(lines + "\n", encoding="utf-8")
     if as_json:
-        typer.echo(json.dumps(_finite(summary), ensure_ascii=False, allow_nan=False))
+        typer.echo(json.dumps(text_files.make_finite(summary), ensure_ascii=False, allow_nan=False))
     elif not quiet:
         typer.echo(lines)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _finite(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return str(value) if isinstance(value, Path) else value
 
 
 class Progress(Protocol):

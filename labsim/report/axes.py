@@ -1,7 +1,4 @@
-"""Single pictures on matplotlib axes, for scripts and notebooks: a curve, a map, a posterior.
-
-This file chooses no backend: a notebook draws with its own.
-"""
+"""Single pictures on matplotlib axes, for scripts and notebooks: a curve, a map, a posterior."""
 
 from __future__ import annotations
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import corner
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -20,7 +19,7 @@ from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .drop_views import DropView
-from .look import BLUE, GREY, INK, ORANGE, PHI, STYLE, new_figure
+from .look import BLUE, GREY, INK, ORANGE, PHI, corner_side, new_figure
 from .map_views import MapView
 
 COLOURS = (ORANGE, BLUE)  # nominal, extended
@@ -36,8 +35,7 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
     columns = min(4, len(views))
     lines = math.ceil(len(views) / columns)
     width, height = max(PANEL[0] * columns, 5.0), PANEL[1] * lines
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(width, height))
+    with new_figure(path, width, height, layout=None) as figure:
         grid = _divide(figure, lines, columns, right=0.12, wspace=0.22, hspace=0.28)
         for k, view in enumerate(views):
             cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
@@ -63,8 +61,6 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
             below.set_xlabel("time since contact (ms)", fontsize=8)
             if k == 0:
                 above.legend(fontsize=7)
-        figure.savefig(path)
-        plt.close(figure)
     return path
 
 
@@ -134,9 +130,8 @@ def draw_maps(views: Sequence[MapView], path: Path) -> Path:
             for name in view.simulated
         ] or [[measured]]
     columns = max(map(len, rows))
-    with plt.rc_context(STYLE):
-        width, height = max(3.1 * columns, 4.6), 3.0 * len(rows)
-        figure = plt.figure(figsize=(width, height))
+    width, height = max(3.1 * columns, 4.6), 3.0 * len(rows)
+    with new_figure(path, width, height, layout=None) as figure:
         axes = _divide(figure, len(rows), columns, right=0.6, wspace=0.3, hspace=0.28).subplots(squeeze=False)
         for ax in axes.flat:
             ax.set_visible(False)
@@ -147,8 +142,6 @@ def draw_maps(views: Sequence[MapView], path: Path) -> Path:
             line[0].set_ylabel("height above the surface (mm)")
         for ax in axes[-1]:
             ax.set_xlabel("distance from the axis (mm)")
-        figure.savefig(path)
-        plt.close(figure)
     return path
 
 
@@ -157,7 +150,7 @@ def _draw_map(ax: Axes, view: MapView, values: FloatArray, colours: dict[str, An
     r = np.concatenate([-found.r[::-1], found.r]) * 1e3
     both = np.concatenate([values[:, ::-1], values], axis=1)
     picture = ax.pcolormesh(r, found.z * 1e3, both, **colours)
-    plt.colorbar(picture, ax=ax, shrink=0.95)
+    ax.figure.colorbar(picture, ax=ax, shrink=0.95)
     radius = found.bead_radius * 1e3
     ax.add_patch(Circle((0, radius - found.tip_depth * 1e3), radius, fill=False, ec=INK, lw=0.8))
     ax.axhline(0.0, color=INK, lw=0.6)
@@ -174,17 +167,17 @@ def draw_posterior(posterior: Posterior, path: Path) -> Path | None:
         values = posterior.samples(name)
         columns.append(values / 1e3 if name == "p_m_Pa" else values)
         labels.append(P_M if name == "p_m_Pa" else name.replace("_", " ").replace(".", ": "))
-    with plt.rc_context(STYLE):
-        figure = corner.corner(
+    side = corner_side(len(columns))
+    with new_figure(path, side, side, layout=None) as figure:
+        corner.corner(
             np.stack(columns, axis=1)[::10],
+            fig=figure,
             labels=labels,
             quantiles=[0.05, 0.5, 0.95],
             show_titles=True,
             title_fmt=".3g",
             color=BLUE,
         )
-        figure.savefig(path)
-        plt.close(figure)
     return path
 
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
@@ -28,12 +28,19 @@ STYLE: Any = {
 
 
 @contextmanager
-def new_figure(path: Path, width: float = 6.4, height: float = 4.4) -> Iterator[Figure]:
-    """A figure in labsim's look, written to ``path`` and closed."""
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(width, height), layout="constrained")
-        try:
-            yield figure
-            figure.savefig(path)
-        finally:
-            plt.close(figure)
+def new_figure(
+    path: Path, width: float = 6.4, height: float = 4.4, layout: str | None = "constrained"
+) -> Iterator[Figure]:
+    """A figure in labsim's look, written to ``path``.
+
+    It belongs to no window: what shows pictures in a notebook or on a screen stays as it was.
+    """
+    with rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
+        yield figure
+        figure.savefig(path)
+
+
+def corner_side(count: int) -> float:
+    """Inches across a corner plot of so many parameters."""
+    return 2.1 * count + 1.3

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from ..records import FloatArray
 from ..sph import DropRun, particles
@@ -37,8 +39,9 @@ def draw_movie(run: DropRun, path: Path) -> Path:
 
 def _draw(run: DropRun, seen: list[tuple[float, float, FloatArray]]) -> Iterator[npt.NDArray[np.uint8]]:
     for time, depth, (x, z, density) in seen:
-        with plt.rc_context(STYLE):
-            figure = plt.figure(figsize=(6.8, 4.4), layout="constrained")
+        with rc_context(STYLE):
+            figure = Figure(figsize=(6.8, 4.4), layout="constrained")
+            canvas = FigureCanvasAgg(figure)
             fill_density_field(
                 figure,
                 run.setting,
@@ -47,7 +50,6 @@ def _draw(run: DropRun, seen: list[tuple[float, float, FloatArray]]) -> Iterator
                 run.penetration_depth,
                 f"{time * 1e3:.2f} ms",
             )
-            figure.canvas.draw()
-            picture = np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
-            plt.close(figure)
+            canvas.draw()
+            picture = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         yield picture

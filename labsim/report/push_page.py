@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 
 from ..calibrated import say_law, show_parameter
@@ -85,7 +86,7 @@ def draw_pushes(views: Sequence[PushView], path: Path) -> Path:
     with new_figure(path, 6.4, 5.2) as figure:
         ax = figure.subplots()
         for view, speed in sorted(zip(views, speeds, strict=True), key=lambda each: each[1]):
-            observed, colour = view.model.observed, plt.get_cmap("viridis")(norm(speed))
+            observed, colour = view.model.observed, colormaps["viridis"](norm(speed))
             net = observed.record.pressure - observed.weight * observed.record.depth
             ax.plot(net / 1e6, observed.record.depth, color=colour, lw=0.5, alpha=0.5)
             ax.plot(np.exp(observed.resistance) / 1e6, observed.depth, ".-", color=colour, lw=1.1, ms=4)
@@ -94,7 +95,7 @@ def draw_pushes(views: Sequence[PushView], path: Path) -> Path:
         ax.invert_yaxis()
         ax.set_xlabel("net resistance (MPa)")
         ax.set_ylabel("depth (m)")
-        bar = figure.colorbar(plt.cm.ScalarMappable(norm, "viridis"), ax=ax)
+        bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=ax)
         bar.set_label("speed (mm/s)")
         ticks = sorted({round(speed, 3) for speed in speeds})
         bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import corner
 import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 
 from ..diagnosis.published_scan import compacted_area
@@ -14,7 +13,7 @@ from ..diagnosis.summary import SummaryDiagnosis
 from ..inference.planar import expected_raw_depth, round_depth
 from ..inference.published import impact_speed
 from ..inference.summary import SummaryCalibration
-from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, STYLE, new_figure
+from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, corner_side, new_figure
 
 
 def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
@@ -36,7 +35,7 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
     assert published is not None
     with new_figure(path) as figure:
         axes = figure.add_subplot()
-        colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.78, 5))
+        colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.78, 5))
         for run, colour in zip(runs[first : first + 5], colours, strict=True):
             upto = run.time <= 1.12 * run.stopping_time
             axes.plot(
@@ -191,9 +190,11 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
         if truth is not None:
             low, high = min(low, truth), max(high, truth)
         ranges.append((low - 0.05 * (high - low), high + 0.05 * (high - low)))
-    with plt.rc_context({**STYLE, "axes.spines.top": True, "axes.spines.right": True}):
-        figure = corner.corner(
+    side = corner_side(data.shape[1])
+    with new_figure(path, side, side, layout=None) as figure:
+        corner.corner(
             data,
+            fig=figure,
             labels=["p_m (kPa)", f"raw depth of {drop} (mm)", f"T_s of {drop} (ms)"],
             truths=truths,
             truth_color=ORANGE,
@@ -210,8 +211,6 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
         figure.text(
             0.98, 0.98, f"p_m from {_used(calibration)}\norange: published", ha="right", va="top", color=INK
         )
-        figure.savefig(path, bbox_inches="tight")
-        plt.close(figure)
     return path
 
 

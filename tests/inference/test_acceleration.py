@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.cli.measured import write_measured_diagnosis
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.inference.calibrate import calibrate, prepare
 from labsim.inference.observations.acceleration_model import AccelerationModel
+from labsim.report.outputs import write_result
 
 
 def fit(folder: Path, tmp_path: Path):  # type: ignore[no-untyped-def]
@@ -67,7 +67,7 @@ def test_diagnosis_draws_and_states_held_out_records(tmp_path: Path) -> None:
     folder = accelerations.write_campaign(tmp_path / "c")
     found = diagnose_campaign(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
     (tmp_path / "out").mkdir()
-    write_measured_diagnosis(found, tmp_path / "out")
+    write_result(found, tmp_path / "out")
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     gain = said["gain"]
     assert 0.0 < gain["rms_nominal_m"] < 3 * gain["rms_noise_m"] < 2e-4

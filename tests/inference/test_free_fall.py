@@ -8,12 +8,12 @@ import laws
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.cli.measured import write_measured_calibration, write_measured_diagnosis
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.inference.calibrate import calibrate
 from labsim.inference.free_fall import doubt_scales, pool
 from labsim.inference.observe import observe_drops, read_observed_track
 from labsim.records import Measured
+from labsim.report.outputs import write_result
 
 P01 = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
 FEW = ("D05", "D06", "D07", "D13")
@@ -92,10 +92,10 @@ def test_calibrate_and_diagnose_say_it_before_their_result(tmp_path):
     campaign, store = read_campaign(folder), laws.LawStore(tmp_path / "store")
     found = calibrate(campaign, store=store)
     (tmp_path / "out").mkdir()
-    _, lines = write_measured_calibration(found, tmp_path / "out")
+    _, lines = write_result(found, tmp_path / "out")
     said = [line for line in lines.split("p_m = ")[0].splitlines() if "free fall shows g" in line]
     assert len(said) == 1 and said[0].startswith("warning: ") and said[0].endswith(file.parent.name)
     found = diagnose_campaign(campaign, store, workers=1)
-    summary, lines = write_measured_diagnosis(found, tmp_path / "out")
+    summary, lines = write_result(found, tmp_path / "out")
     assert any("free fall shows g" in text for text in summary["warnings"][: found.doubts])
     assert "free fall shows g" in lines.split("probability  cause")[0]

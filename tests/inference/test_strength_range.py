@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.cli.measured import write_measured_calibration, write_measured_diagnosis
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.inference import fitting
 from labsim.inference.calibrate import calibrate
+from labsim.report.outputs import write_result
 
 TRUE = 1300.0  # Pa, of laws.write_campaign
 
@@ -30,7 +30,7 @@ def test_a_range_without_the_truth_is_said_first(tmp_path, p_m_range):
     assert low * (1 - 1e-9) <= p_m <= high * (1 + 1e-9)
     apart = min(abs(math.log(p_m / end)) for end in p_m_range) / math.sqrt(found.fit.covariance[0, 0])
     (tmp_path / "out").mkdir()
-    _, lines = write_measured_calibration(found, tmp_path / "out")
+    _, lines = write_result(found, tmp_path / "out")
     said = json.loads((tmp_path / "out" / "calibration.json").read_text())["warnings"]
     if apart < 2.0:
         assert "end of its range" in said[0] and lines.startswith("warning: the best p_m lies ")
@@ -63,7 +63,7 @@ def test_a_diagnosis_says_it_too(tmp_path):
     set_range(folder, (300.0, 1400.0))
     found = diagnose_campaign(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
     (tmp_path / "out").mkdir()
-    summary, lines = write_measured_diagnosis(found, tmp_path / "out")
+    summary, lines = write_result(found, tmp_path / "out")
     assert math.exp(found.nominal.log_p_m) == pytest.approx(1400.0)
     assert summary["warnings"][0].startswith(
         "nominal model: the best p_m lies at the end of its range, 1400 Pa"

@@ -10,12 +10,11 @@ import laws
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.cli.diagnose import write_diagnosis
-from labsim.cli.measured import write_measured_calibration, write_measured_diagnosis
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.summary import diagnose_summary
 from labsim.inference.calibrate import calibrate
 from labsim.inference.summary import calibrate_summary
+from labsim.report.outputs import write_result
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"
 HOSTILE = "<script>document.title='ran'</script>"
@@ -28,7 +27,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def write(found: Diagnosis, folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
-    write_measured_diagnosis(found, folder)
+    write_result(found, folder)
     return folder
 
 
@@ -75,7 +74,7 @@ def calibrated(place: Path) -> Path:
     campaign = read_campaign(laws.write_campaign(place / "campaign-one", drops=laws.DROPS[2:3]))
     folder = place / "calibrated"
     folder.mkdir()
-    write_measured_calibration(calibrate(campaign, store=laws.LawStore(place / "store")), folder)
+    write_result(calibrate(campaign, store=laws.LawStore(place / "store")), folder)
     return folder
 
 
@@ -86,7 +85,7 @@ def published(place: Path) -> Path:
     calibration = calibrate_summary(read_campaign(SEED), store, workers=1)
     folder = place / "published"
     folder.mkdir()
-    write_diagnosis(diagnose_summary(calibration, store, workers=1), folder)
+    write_result(diagnose_summary(calibration, store, workers=1), folder)
     return folder
 
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.cli.measured import write_measured_diagnosis
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.effects.model import Model
 from labsim.errors import EffectError
 from labsim.inference.calibrate import calibrate
 from labsim.inference.target import integrate_evidence
+from labsim.report.outputs import write_result
 
 
 def test_a_single_drop_is_diagnosed_without_holding_any_out(place):
@@ -24,7 +24,7 @@ def test_a_single_drop_is_diagnosed_without_holding_any_out(place):
     found = diagnose_campaign(campaign, laws.LawStore(place / "store"), workers=1)
     folder = place / "single"
     folder.mkdir()
-    summary, lines = write_measured_diagnosis(found, folder)
+    summary, lines = write_result(found, folder)
     assert math.isnan(found.gain.rms_nominal)
     assert json.loads((folder / "diagnosis.json").read_text())["gain"]["rms_nominal_m"] is None
     assert summary["verdict"] in ("none", "effect", "unknown")

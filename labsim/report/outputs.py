@@ -1,0 +1,172 @@
+"""What ``calibrate`` and ``diagnose`` write of a result into a folder: summary, posterior, model, pictures and page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from .. import text_files
+from ..campaign_tables import MATERIAL_KEYS
+from ..diagnosis.campaign import Diagnosis
+from ..diagnosis.next_experiment import suggest
+from ..diagnosis.summary import SummaryDiagnosis
+from ..effects import Model, list_effects, write_model
+from ..inference.calibrate import Calibration
+from ..inference.fitting import Fit
+from ..inference.posterior import Posterior
+from ..inference.summary import SummaryCalibration
+from . import campaign_figures as figures
+from .campaign_page import write_calibration_page, write_campaign_page
+from .campaign_tables import (
+    campaign_calibration_lines,
+    campaign_calibration_summary,
+    campaign_diagnosis_lines,
+    campaign_diagnosis_summary,
+    extended_model,
+    is_pushed,
+    state_numerical_error,
+)
+from .drop_views import DropView, view_drops
+from .law_figures import draw_laws
+from .map_views import MapView, measure_maps, view_maps
+from .push_page import write_push_calibration, write_push_diagnosis
+from .run_figures import draw_density_field
+from .summary_figures import (
+    draw_compacted_volume,
+    draw_corner,
+    draw_depth_law,
+    draw_fit,
+    draw_penetration,
+)
+from .summary_page import write_page
+from .tables import calibration_lines, calibration_summary, diagnosis_lines, diagnosis_summary
+
+Found = Calibration | Diagnosis | SummaryCalibration | SummaryDiagnosis
+Write = Callable[[Path, dict[str, Any]], Path]
+
+
+def write_result(
+    found: Found, folder: Path, write_json: Write = text_files.write_json
+) -> tuple[dict[str, Any], str]:
+    """Write all files of a result into a folder that exists.
+
+    Parameters
+    ----------
+    found : Calibration, Diagnosis, SummaryCalibration or SummaryDiagnosis
+    folder : Path
+    write_json : callable
+        Writes the summary file; the command line puts in what made the result.
+
+    Returns
+    -------
+    summary : dict
+        What the JSON file holds, SI.
+    lines : str
+        The same for people.
+    """
+    if isinstance(found, Calibration):
+        return _write_calibration(found, folder, write_json)
+    if isinstance(found, Diagnosis):
+        return _write_diagnosis(found, folder, write_json)
+    if isinstance(found, SummaryCalibration):
+        return _write_summary_calibration(found, folder, write_json)
+    return _write_summary_diagnosis(found, folder, write_json)
+
+
+def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> tuple[dict, str]:
+    summary = campaign_calibration_summary(found)
+    write_json(folder / "calibration.json", summary)
+    _write_posterior(found.posterior, folder)
+    if is_pushed(found.bench):
+        write_push_calibration(found, folder)
+        return summary, campaign_calibration_lines(found)
+    figures.draw_posterior(found.posterior, folder / "corner.png")
+    views, maps = _draw_fits(found, [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)], folder)
+    (folder / "drops.png").rename(folder / "fit.png")
+    figures.draw_p_m([("calibrated", found.posterior)], folder / "posterior.png")
+    write_calibration_page(found, summary, state_numerical_error(found.bench), views, maps, folder)
+    return summary, campaign_calibration_lines(found)
+
+
+def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple[dict, str]:
+    probabilities = dict(found.verdict.probabilities)
+    suggestions = suggest(found.bench, [found.nominal, *found.rivals], probabilities)
+    summary = campaign_diagnosis_summary(found, suggestions)
+    write_json(folder / "diagnosis.json", summary)
+    write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
+    _write_posterior(found.posterior_extended, folder)
+    if is_pushed(found.bench):
+        write_push_diagnosis(found, summary, suggestions, folder)
+        return summary, campaign_diagnosis_lines(found, suggestions)
+    fits = [("nominal", found.nominal)]
+    posteriors = [("nominal", found.posterior_nominal)]
+    if found.best is not found.nominal:
+        fits.append((" + ".join(found.best.hypothesis), found.best))
+        posteriors.append((fits[1][0], found.posterior_extended))
+    views, maps = _draw_fits(found, fits, folder)
+    figures.draw_causes(found, folder / "causes.png")
+    (folder / "law.png").unlink(missing_ok=True)
+    if found.verdict.word == "unknown" and found.unknown.laws:
+        learned = found.learned.best if found.learned else None
+        draw_laws(found.unknown.laws, folder / "law.png", learned)
+    figures.draw_held_out(found, [name for name, _ in fits], folder / "held_out.png")
+    figures.draw_p_m(posteriors, folder / "posterior.png")
+    figures.draw_posterior(found.posterior_extended, folder / "corner.png")
+    write_campaign_page(found, summary, suggestions, views, maps, folder)
+    return summary, campaign_diagnosis_lines(found, suggestions)
+
+
+def _write_summary_calibration(
+    found: SummaryCalibration, folder: Path, write_json: Write
+) -> tuple[dict, str]:
+    summary = calibration_summary(found)
+    write_json(folder / "calibration.json", summary)
+    _write_posterior(found.posterior, folder)
+    draw_corner(found, folder / "corner.png")
+    draw_fit(found, folder / "fit.png")
+    return summary, calibration_lines(found)
+
+
+def _write_summary_diagnosis(found: SummaryDiagnosis, folder: Path, write_json: Write) -> tuple[dict, str]:
+    calibration = found.calibration
+    _write_summary_calibration(calibration, folder, write_json)
+    summary = diagnosis_summary(found)
+    write_json(folder / "diagnosis.json", summary)
+    q = calibration.quantiles
+    material = calibration.campaign.material.replace(bulk_modulus=calibration.bulk_modulus)
+    fields = [field for field, _low, _high in MATERIAL_KEYS.values()]
+    write_model(
+        folder / "model.toml",
+        Model(q["q50"], material=tuple((field, getattr(material, field)) for field in fields)),
+        comments=[
+            f"{calibration.campaign.name}: p_m calibrated on {' and '.join(calibration.use)}, planar, "
+            f"90 % between {q['q05']:.0f} and {q['q95']:.0f} Pa"
+        ],
+    )
+    draw_penetration(calibration, folder / "penetration.png")
+    draw_depth_law(found, folder / "depth_law.png")
+    draw_compacted_volume(found, folder / "compacted_volume.png")
+    draw_density_field(calibration.finest_run, folder / "density_field.png")
+    write_page(found, folder)
+    return summary, diagnosis_lines(found)
+
+
+def _write_posterior(posterior: Posterior, folder: Path) -> None:
+    (folder / "posterior.nc").unlink(missing_ok=True)
+    posterior.data.to_netcdf(str(folder / "posterior.nc"), engine="h5netcdf")
+
+
+def _draw_fits(
+    found: Calibration | Diagnosis, fits: list[tuple[str, Fit]], folder: Path
+) -> tuple[list[DropView], list[MapView]]:
+    """Pictures of drops and scans with each named fit, and the views that the page shows of them."""
+    views = view_drops(found.bench, fits)
+    figures.draw_drops(views, folder / "drops.png")
+    figures.draw_misfit(views, folder / "misfit.png")
+    maps = measure_maps(found.campaign, view_maps(found.bench, fits))
+    if maps:
+        figures.draw_maps(maps, folder / "maps.png")
+    if found.bench.undisturbed:
+        figures.draw_undisturbed(found.bench, folder / "undisturbed.png")
+    return views, maps
