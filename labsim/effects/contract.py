@@ -68,6 +68,20 @@ class Parameter:
         low, high = self.limits
         return min(max(self.null + amplitude, low), high)
 
+    @property
+    def is_ratio(self) -> bool:
+        """Whether the parameter counts by its ratio to null: it is positive by its prior, and null is no zero."""
+        return isinstance(self.prior, LogNormal) and self.null > 0.0
+
+    def grade(self, amplitude: float) -> float:
+        """Where an amplitude lies on the scale on which what it does is smooth: ln of the ratio to null of what counts by that,
+        the amplitude itself of all else. A factor of 0.1 is as far from 0.2 as 0.5 is from 1."""
+        return math.log1p(amplitude / self.null) if self.is_ratio else amplitude
+
+    def amplitude_at(self, grade: float) -> float:
+        """The amplitude at a grade."""
+        return self.null * math.expm1(grade) if self.is_ratio else grade
+
     def draw(self, rng: np.random.Generator) -> float:
         """A value from the prior between the limits."""
         below, above = (float(self.prior.cdf(limit)) for limit in self.limits)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..effects import Parameter
 from ..errors import ExtrapolationError
 from ..records import STANDARD_GRAVITY, FloatArray
 from .curves import decode_depth, decode_rate
@@ -25,13 +26,15 @@ Changes = dict[float, dict[float, FloatArray]]
 class ResponseTable:
     """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the base at all speeds.
-    fingerprints : the same from coarser runs at the few speeds, taken where there are no changes."""
+    fingerprints : the same from coarser runs at the few speeds, taken where there are no changes. parameters : of effects whose
+    amplitudes have a grade of their own."""
 
     log_speeds: FloatArray
     few: tuple[int, ...]
     base: dict[float, FloatArray] = field(default_factory=dict)
     changes: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
+    parameters: dict[str, Parameter] = field(default_factory=dict)
     _stacks: dict[int, tuple[Mapping[float, FloatArray], FloatArray]] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -50,6 +53,10 @@ class ResponseTable:
         weights = smooth_weights(_log_strengths(self.base), log_p_m)
         plain = np.outer(weights, across).ravel() @ self.stack(self.base)
         return Response(self, log_p_m, log_speed, across, plain)
+
+    def grade(self, name: str, amplitude: float) -> float:
+        """Where an amplitude of an effect lies on the scale on which codes are interpolated."""
+        return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude
 
     def stack(self, codes: Mapping[float, FloatArray]) -> FloatArray:
         """The codes of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""
@@ -92,7 +99,8 @@ class Response:
         inside = min(max(self.log_p_m, min(nodes) - margin), max(nodes) + margin)
         change = np.zeros(self.plain.size)
         for index, weight in zip(indices, smooth_weights(nodes, inside), strict=True):
-            shares = smooth_weights((0.0, *runs[index]), amplitude)[1:]
+            grades = [0.0, *(self.table.grade(name, each) for each in runs[index])]
+            shares = smooth_weights(grades, self.table.grade(name, amplitude))[1:]
             change += weight * (np.outer(shares, across).ravel() @ self.table.stack(runs[index]))
         return change
 

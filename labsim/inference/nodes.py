@@ -51,11 +51,12 @@ def screening_node(log_p_m: float) -> int:
 def amplitude_nodes(
     effect: Effect, amplitude: float, *, coarse: bool = False, around: bool = False
 ) -> list[float]:
-    """Amplitudes to simulate about an estimate: multiples of the effect's step, at least one, inside its limits; ``around``: one
-    more beyond them, so that the curve between two does not depend on the side that the estimate came from."""
+    """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits;
+    ``around``: one more beyond them, so that the curve between two does not depend on the side that the estimate came from."""
     parameter = effect.amplitudes[0]
     step = parameter.step
-    place = amplitude / step
+    unit = parameter.grade(step)
+    place = parameter.grade(amplitude) / unit
     # of the numerics, much finer runs would cost more than they say
     if abs(place) <= 1.0 or effect.kind == "numerics":
         wanted = [1.0 if place >= 0 else -1.0]
@@ -67,7 +68,7 @@ def amplitude_nodes(
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
     nodes = []
     for m in wanted:
-        value = parameter.hold(m * step) - parameter.null
+        value = parameter.hold(parameter.amplitude_at(m * unit)) - parameter.null
         if value == 0.0:  # the limit is the null on that side
             value = step
         if value not in nodes:

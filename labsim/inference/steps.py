@@ -140,8 +140,10 @@ def _shorten(bench: Workbench, step: FloatArray, values: Mapping[str, float]) ->
     """Shorten a step so that no amplitude moves by more than 1.5 of its own simulation steps at once."""
     factor = min(1.0, 0.7 / max(abs(float(step[0])), 1e-12))
     for moved, (name, value) in zip(step[1:], values.items(), strict=True):
-        unit = abs(bench.effects[name].amplitudes[0].step)
-        reach = 1.5 * unit * max(1.0, abs(value / unit))
+        parameter = bench.effects[name].amplitudes[0]
+        unit, here = abs(parameter.grade(parameter.step)), parameter.grade(value)
+        further = math.copysign(1.5 * max(unit, abs(here)), moved)
+        reach = abs(parameter.amplitude_at(here + further) - value)
         if abs(moved) > reach:
             factor = min(factor, reach / abs(float(moved)))
     return step * factor

@@ -24,11 +24,13 @@ def linearise_at(
     """Every observation about a point. further : effects whose tangents at null are wanted too."""
     probes = {}
     for name, amplitude in {**{name: 0.0 for name in further}, **values}.items():
-        step = 0.05 * bench.effects[name].amplitudes[0].step
         parameter = bench.effects[name].amplitudes[0]
+        step = 0.05 * parameter.grade(parameter.step)
+        here = parameter.grade(amplitude)
         low, high = parameter.limits
-        if not low <= parameter.null + amplitude + step <= high:
+        if not low <= parameter.null + parameter.amplitude_at(here + step) <= high:
             step = -step
+        step = parameter.amplitude_at(here + step) - amplitude
         probes[name] = _stand(bench, {**values, name: amplitude + step}, step)
     nominal = _stand(bench, values)
     return tuple(

@@ -121,6 +121,8 @@ class TruthTable:
                 else:
                     name, amplitude = variant
                     entry = table.changes.setdefault(name, {}).setdefault(index, {})
+                    if len(alone := list(variants[variant])) == 1:
+                        table.parameters[name] = self.effect(alone[0]).amplitudes[0]
                     entry[amplitude] = codes - table.base[index]
 
     def _list_families(self, blurs: Sequence[float]) -> list[Family]:

@@ -114,6 +114,7 @@ class Workbench:
         for (table, codes), (_, plain) in zip(after, before, strict=True):
             kept = table.changes if cells is None else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
+            table.parameters[name] = self.effects[name].amplitudes[0]
             if codes is not None and plain is not None:
                 entry[amplitude] = codes - plain
 

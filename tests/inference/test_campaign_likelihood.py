@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from labsim.effects import LogNormal, Parameter
 from labsim.inference.blocks import solve_globals
 from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
 from labsim.inference.evidence import log_share_inside
@@ -108,6 +109,24 @@ def test_effects_add_a_polynomial_that_vanishes_at_null():
     table.changes["f"] = {0: {1.0: 0.3 * np.ones_like(base), 2.0: 1.2 * np.ones_like(base)}}
     table.changes["e"] = table.changes.pop("f")
     assert table.at(math.log(1200.0), speeds[1]).change("e", 1.5) == pytest.approx(0.675, rel=1e-12)
+
+
+def test_a_power_of_a_factor_is_met_from_its_null_to_its_limit():
+    """ln D of dust weakened by a factor falls with ln of the factor: exact on that scale, far off on the factor's own."""
+    speeds = np.log([0.2, 0.3, 0.4])
+    base = np.stack([sine_code() for _ in speeds])
+    table = ResponseTable(speeds, (0, 2), {0: base})
+    table.changes["e"] = {
+        0: {value - 1.0: np.full_like(base, -0.3 * math.log(value)) for value in (0.5, 0.05)}
+    }
+
+    def change(value):
+        return table.at(math.log(1000.0), speeds[1]).change("e", value - 1.0)
+
+    assert abs(change(0.125) + 0.3 * math.log(0.125)).min() > 0.1
+    table.parameters["e"] = Parameter("f", "1", 1.0, (0.05, 20.0), LogNormal(1.0, 0.6), 0.5, "of a strength")
+    for value in (0.05, 0.125, 0.3, 0.8, 1.5):
+        assert change(value) == pytest.approx(-0.3 * math.log(value), rel=1e-12)
 
 
 def test_what_an_effect_changes_bends_with_strength_through_three_nodes():

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from labsim.effects import LogNormal, Parameter
+from labsim.effects import HalfNormal, LogNormal, Parameter, list_effects
 from labsim.inference.grid import interpolation_weights, smooth_weights, strength_node
-from labsim.inference.nodes import nodes_around
+from labsim.inference.nodes import amplitude_nodes, nodes_around
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 7])
@@ -50,3 +50,28 @@ def test_an_amplitude_at_a_limit_has_a_prior():
     assert 1.0 + amplitude < 0.1  # by rounding
     assert factor.hold(amplitude) == 0.1
     assert factor.log_prior(factor.hold(amplitude)) > -math.inf
+
+
+FACTOR = Parameter("factor", "1", 1.0, (0.05, 20.0), LogNormal(1.0, 0.6), 0.5, "of a strength")
+
+
+def test_what_is_positive_counts_by_its_ratio_to_null():
+    assert FACTOR.grade(-0.5) - FACTOR.grade(-0.75) == pytest.approx(math.log(2.0))
+    plain = Parameter("mu", "1", 0.0, (0.0, 2.0), HalfNormal(0.3), 0.15, "friction")
+    from_nothing = Parameter("factor", "1", 0.0, (0.0, 6.0), LogNormal(1.0, 0.5), 0.25, "null is a zero")
+    for parameter in (FACTOR, plain, from_nothing):
+        for amplitude in (0.0, 0.15, 1.2):
+            assert parameter.amplitude_at(parameter.grade(amplitude)) == pytest.approx(amplitude, rel=1e-14)
+    assert plain.grade(0.7) == from_nothing.grade(0.7) == 0.7
+    assert FACTOR.grade(0.0) == 0.0
+
+
+@pytest.mark.parametrize("value", [0.051, 0.07, 0.125, 0.3, 0.6, 1.7, 5.0, 19.0])
+def test_a_small_factor_lies_between_near_ones(value):
+    """A factor of 0.125 used to lie between runs at 0.5 and 0.05, where the depth was off by 14 to 23 %."""
+    tensile = list_effects(None)["tensile_strength"]
+    nodes = amplitude_nodes(tensile, value - 1.0, around=True)
+    simulated = np.sort([1.0, *(1.0 + amplitude for amplitude in nodes)])
+    above = int(np.searchsorted(simulated, value))
+    assert 0 < above < simulated.size
+    assert simulated[above] / simulated[above - 1] < 2.26
