@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import CampaignError, LabsimError, MeasurementError
+from .errors import CampaignError, MeasurementError
 from .records import STANDARD_GRAVITY, Accelerometer, Drop, FloatArray, Measured, Sensor
 from .tables import Table
-from .tracks.lines import find_mark, read_lines, split_line
+from .tracks.lines import read_named_columns
 
 UNITS = {"g": STANDARD_GRAVITY, "m/s^2": 1.0}
 FEWEST = 30  # samples
@@ -164,40 +164,10 @@ def read_acceleration(path: Path, accelerometer: Accelerometer) -> Acceleration:
 
 def _read_columns(path: Path, names: list[str]) -> FloatArray:
     """(rows, names); an empty cell is NaN, but not that of the time."""
-    try:
-        lines = read_lines(path)
-    except LabsimError as trouble:
-        raise MeasurementError(path, "record.file", trouble.message) from None
-    if not lines:
-        raise MeasurementError(path, "record.file", "is empty; export the table with its heading")
-    mark = find_mark(lines[0][1])
-    heading = split_line(lines[0][1], mark)
-    for name in names:
-        if heading.count(name) != 1:
-            raise MeasurementError(
-                path,
-                f"line {lines[0][0]}",
-                f"has {heading.count(name) or 'no'} column{'s' * (heading.count(name) > 1)} {name!r}; "
-                f"the columns are {', '.join(heading)[:200]}",
-            )
-    places = [heading.index(name) for name in names]
-    rows = np.full((len(lines) - 1, len(names)), math.nan)
-    for row, (number, text) in zip(rows, lines[1:], strict=True):
-        cells = split_line(text, mark)
-        for k, place in enumerate(places):
-            cell = cells[place] if place < len(cells) else ""
-            if cell == "" and k > 0:
-                continue
-            try:
-                row[k] = float(cell.replace(",", ".") if mark != "," else cell)
-            except ValueError:
-                raise MeasurementError(
-                    path, f"line {number}", f"{cell[:40]!r} is not a number; correct or remove the line"
-                ) from None
-        if not math.isfinite(row[0]) or np.isinf(row).any():
-            raise MeasurementError(
-                path, f"line {number}", "holds no finite number; correct or remove the line"
-            )
+    lines, rows = read_named_columns(path, names)
+    for number, time in zip(lines, rows[:, 0], strict=True):
+        if not math.isfinite(time):
+            raise MeasurementError(path, f"line {number}", "holds no time; correct or remove the line")
     if len(rows) < FEWEST:
         raise MeasurementError(
             path, "record.file", f"has {len(rows)} samples; an impact takes {FEWEST} or more"

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
+
 from .campaign_tables import find_toml, list_parts, read_source
-from .errors import CampaignError, LabsimError
+from .errors import CampaignError, MeasurementError
 from .records import STRENGTH_KINDS, Sample, StrengthTest
 from .tables import Document, Table
-from .tracks.lines import find_mark, read_lines, split_line
+from .tracks.lines import read_named_columns
 
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "mbar": 1e2}
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -79,33 +81,13 @@ def _read_columns(data: Path, table: Table, wanted: list[str]) -> list[tuple[int
     if not data.is_file():
         raise table.wrong("file", f"{data} is not there; name the table of the test")
     try:
-        lines = read_lines(data)
-    except LabsimError as trouble:
-        raise CampaignError(data, "", trouble.message) from None
-    if not lines:
-        raise CampaignError(data, "", "is empty; export the table with its heading")
-    mark = find_mark(lines[0][1])
-    heading = split_line(lines[0][1], mark)
-    for name in wanted:
-        if name not in heading:
-            raise CampaignError(
-                data,
-                f"line {lines[0][0]}",
-                f"there is no column {name!r}; the columns are {', '.join(heading)[:200]}",
-            )
-    places = [heading.index(name) for name in wanted]
-    found = []
-    for number, text in lines[1:]:
-        cells = split_line(text, mark)
-        values = []
-        for place in places:
-            cell = cells[place] if place < len(cells) else ""
-            try:
-                value = float(cell.replace(",", ".") if mark != "," else cell)
-            except ValueError:
-                value = math.nan
-            if not math.isfinite(value):
-                raise CampaignError(data, f"line {number}", f"{cell!r} is not a number; correct or remove it")
-            values.append(value)
-        found.append((number, values[0], values[1]))
-    return found
+        lines, rows = read_named_columns(data, wanted)
+    except MeasurementError as trouble:
+        raise CampaignError(data, trouble.key, trouble.message) from None
+    for number, row in zip(lines, rows, strict=True):
+        if np.isnan(row).any():
+            name = wanted[int(np.argmax(np.isnan(row)))]
+            raise CampaignError(data, f"line {number}", f"has no number in {name!r}; correct or remove it")
+    return [
+        (number, float(first), float(second)) for number, (first, second) in zip(lines, rows, strict=True)
+    ]

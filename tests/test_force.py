@@ -87,6 +87,25 @@ def test_pore_water_behind_a_cone_is_corrected_for(tmp_path: Path) -> None:
     assert record.sleeve == pytest.approx(np.full(60, 20e3)) and record.pore[5] == pytest.approx(105e3)
 
 
+def test_a_sounding_is_read_whatever_its_blanks_and_case(tmp_path: Path) -> None:
+    lines = ["ha=1, ma = 0.800"] + [f"d={0.02 * k:.3f}, qc = 1.0 ,Fs=10.0, u=100.0" for k in range(60)]
+    record = read_force(write(tmp_path / "s.cpt", "\n".join(lines)), gauge(force_unit="MPa"), RADIUS)
+    assert record.pressure == pytest.approx(np.full(60, 1e6 + 0.2 * 100e3))
+    assert record.sleeve == pytest.approx(np.full(60, 10e3))
+
+
+@pytest.mark.parametrize("cell", ["1_0", "0x10", "inf"])
+def test_what_is_no_plain_number_is_refused(tmp_path: Path, cell: str) -> None:
+    lines = ["HA=1,MA=0.800"] + [f"D={0.02 * k:.3f},QC=1.0" for k in range(60)]
+    lines[7] = f"D=0.12,QC={cell}"
+    with pytest.raises(MeasurementError, match=r"line 8: QC='.*' is not a number"):
+        read_force(write(tmp_path / "s.cpt", "\n".join(lines)), gauge(force_unit="MPa"), RADIUS)
+    table = ["depth_mm;force_N", *(f"{k};1,0" for k in range(60))]
+    table[7] = f"6;{cell}"
+    with pytest.raises(MeasurementError, match=r"line 8: '.*' is not a number"):
+        read_force(write(tmp_path / "s.csv", "\n".join(table)), gauge(**NAMED), RADIUS)
+
+
 def test_a_row_without_pore_water_is_lost_not_corrected_by_nothing(tmp_path: Path) -> None:
     lines = ["HA=1,MA=0.800"]
     lines += [f"D={0.02 * k:.3f},QC=1.0" + (f",U={300.0}" if k % 3 else "") for k in range(60)]

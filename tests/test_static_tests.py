@@ -61,10 +61,10 @@ def test_height_and_force_give_filling_factor_and_pressure(folder):
     ("change", "message"),
     [
         (("0.140000,", "x,"), r"curve\.csv: line 2: 'x' is not a number"),
-        (("phi,pressure", "phi,stress"), r"no column 'pressure'; the columns are phi, stress"),
+        (("phi,pressure", "phi,stress"), r"line 1: has no column 'pressure'; the columns are phi, stress"),
         (("0.140000,", "14.0,"), r"filling factor of 14 is outside"),
         (("0.140000,", "0.14,-"), r"pressure of -.* write the size of a tension without a sign"),
-        (("0.140000,", "nan,"), r"'nan' is not a number"),
+        (("0.140000,", "nan,"), r"line 2: has no number in 'phi'"),
     ],
 )
 def test_a_wrong_table_is_named_with_its_line(folder, change, message):

@@ -37,7 +37,12 @@ def diagnose(
     folder, opened = options.make_output_folder(out, campaign, "diagnose"), RunStore(store)
     found: Diagnosis | SummaryDiagnosis
     with options.show_progress(quiet) as progress:
-        settings: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seed": seed, "progress": progress}
+        settings: dict[str, Any] = {
+            "workers": workers,
+            "scheduler": scheduler,
+            "seed": seed,
+            "progress": progress,
+        }
         if read.has_records:
             found = diagnose_campaign(read, opened, **settings)
         else:

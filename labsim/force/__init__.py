@@ -63,14 +63,11 @@ def read_gauge(table: Table) -> Gauge:
             table.check_number("window_mm", value, 0.0, 1e5)
         if not window[0] < window[1]:
             raise table.wrong("window_mm", f"{window} does not grow; write the shallower depth first")
-    units = PRESSURE_UNITS if pressures else FORCE_UNITS
-    default = (
-        None if forces or pressures else "MPa"
-    )  # formats that have no named columns state their own unit
-    unit_name = table.choice(
-        "force_unit", tuple(units if default is None else PRESSURE_UNITS), *([default] * bool(default))
-    )
-    unit = (units if default is None else PRESSURE_UNITS)[unit_name]
+    units = FORCE_UNITS if forces else PRESSURE_UNITS
+    if forces or pressures:
+        unit = units[table.choice("force_unit", tuple(units))]
+    else:  # formats without named columns state their unit
+        unit = units[table.choice("force_unit", tuple(units), "MPa")]
     top = LARGEST / unit
     return Gauge(
         depth_column=table.text("depth_column", ""),

@@ -13,11 +13,11 @@ import numpy as np
 
 from ..errors import LabsimError, MeasurementError
 from ..records import FloatArray, Gauge
-from ..tracks.lines import read_lines
+from ..tracks.lines import read_lines, read_number
 from . import Columns
 
 SUFFIXES = (".cpt",)
-FIELD = re.compile(r"(?:^|,)([A-Z%]+)=([^,]*)")
+FIELD = re.compile(r"(?:^|,)\s*([A-Za-z%]+)\s*=\s*([^,]*)")
 KEYS = ("D", "QC", "FS", "U")
 
 
@@ -30,7 +30,7 @@ def read(path: Path, gauge: Gauge, section: float) -> Columns:
     area_ratio = math.nan
     rows: list[list[float]] = []
     for number, text in lines:
-        fields = dict(FIELD.findall(text))
+        fields = {key.upper(): value.strip() for key, value in FIELD.findall(text)}
         if "MA" in fields and not rows:
             area_ratio = _read(path, number, "MA", fields)
         if "D" in fields and "QC" in fields:
@@ -46,9 +46,8 @@ def read(path: Path, gauge: Gauge, section: float) -> Columns:
             raise MeasurementError(
                 path, "MA", f"is {area_ratio:g}, not an area ratio between 0 and 1; write it into the heading"
             )
-        pressure = (
-            pressure + (1.0 - area_ratio) * pore * 1e3
-        )  # a row without U is lost: nobody knows its correction
+        # a row without U is lost: nobody knows its correction
+        pressure = pressure + (1.0 - area_ratio) * pore * 1e3
     return Columns(depth, pressure, _kept(sleeve), _kept(pore))
 
 
@@ -57,12 +56,7 @@ def _kept(values: FloatArray) -> FloatArray:
 
 
 def _read(path: Path, number: int, key: str, fields: dict[str, str]) -> float:
-    text = fields.get(key, "")
-    if text == "":
-        return math.nan
     try:
-        return float(text)
-    except ValueError:
-        raise MeasurementError(
-            path, f"line {number}", f"{key}={text[:40]!r} is not a number; correct or remove the line"
-        ) from None
+        return read_number(fields.get(key, ""), ",")
+    except ValueError as trouble:
+        raise MeasurementError(path, f"line {number}", f"{key}={trouble}") from None

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import MeasurementError
 from ..records import FloatArray
 from . import Points
-from .lines import find_mark, read_lines, split_line
+from .lines import NUMBER, find_mark, read_lines, split_line
 
 NAME = "tables (CSV) of frame or time, and row, depth or height"
 GENERAL = True  # asked after all other formats
@@ -50,7 +50,6 @@ UNIT = "|".join(sorted({**TIMES, **LENGTHS, **PIXELS}, key=len, reverse=True))
 HEADING = re.compile(
     rf"(?P<name>.*?[^\s_/(\[])(?:(?:\s+in\s+|[\s_/(\[]+)(?P<unit>{UNIT})\s*[)\]]?)?", re.IGNORECASE
 )
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 
 
 def recognises(path: Path) -> bool:

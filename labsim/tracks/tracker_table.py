@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import MeasurementError
 from ..records import FloatArray
 from . import Points
-from .lines import find_mark, read_lines
+from .lines import find_mark, read_lines, read_number
 
 NAME = "OSP Tracker tables (t, x, y … with pixely)"
 SUFFIXES = {".txt", ".csv", ".tsv", ".dat"}
@@ -116,10 +116,8 @@ def _read_numbers(path: Path, rows: list[list[str]], header: list[str], first: i
             if not cell:
                 continue
             try:
-                numbers[i, k] = float(cell.replace(",", ".") if mark != "," else cell)
-            except ValueError:
+                numbers[i, k] = read_number(cell, mark)
+            except ValueError as trouble:
                 if _read_column(header[k])[0] in {"t", "y", "pixely", "frame"}:
-                    raise MeasurementError(
-                        path, header[k], f"line {first + i}: {cell!r} is not a number; correct or remove it"
-                    ) from None
+                    raise MeasurementError(path, header[k], f"line {first + i}: {trouble}") from None
     return numbers
