@@ -30,8 +30,8 @@ def test_what_takes_the_place_of_p_m_is_said_to(opened):
     found = {each.name: each for each in list_untestable(bench, fit)}
     assert set(found) == {"shear_strength", "filling_factor", "projectile_mass", "strength_rate"}
     shear = found["shear_strength"]
-    secant = -math.log(0.75**0.3) / 0.25  # the screening's runs are made at f = 0.75
-    assert shear.traded == pytest.approx(secant, rel=0.02)
+    step = 0.05 * math.log(0.75)  # a twentieth of the screening's, whose runs are made at f = 0.75
+    assert shear.traded == pytest.approx(0.3 * step / math.expm1(step), rel=0.02)
     assert found["filling_factor"].traded == pytest.approx(4 / 0.15, rel=0.02)
     assert found["projectile_mass"].traded == pytest.approx(-1.0, rel=0.02)
     rate = found.pop("strength_rate")  # drops tell it from p_m, but less well than p_m alone is measured

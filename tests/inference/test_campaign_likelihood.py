@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from labsim.effects import LogNormal, Parameter
+from labsim.errors import ExtrapolationError
 from labsim.inference.blocks import solve_globals
 from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
 from labsim.inference.evidence import log_share_inside
@@ -127,6 +128,15 @@ def test_a_power_of_a_factor_is_met_from_its_null_to_its_limit():
     table.parameters["e"] = Parameter("f", "1", 1.0, (0.05, 20.0), LogNormal(1.0, 0.6), 0.5, "of a strength")
     for value in (0.05, 0.125, 0.3, 0.8, 1.5):
         assert change(value) == pytest.approx(-0.3 * math.log(value), rel=1e-12)
+
+
+def test_an_effect_whose_runs_all_failed_is_said_so():
+    """A diagnosis that learned a formula whose runs failed ended in a traceback."""
+    speeds = np.log([0.2, 0.3, 0.4])
+    base = np.stack([sine_code() for _ in speeds])
+    table = ResponseTable(speeds, (0, 2), {0: base}, {"e": {0: {}}})
+    with pytest.raises(ExtrapolationError, match="every run with it failed"):
+        table.code(math.log(1000.0), speeds[1], {"e": 1.0})
 
 
 def test_what_an_effect_changes_bends_with_strength_through_three_nodes():

@@ -37,8 +37,8 @@ NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
 STRENGTH = 0.15  # of ln p_m by which the zones of two codes differ, most under shallow drops
 CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
-# of φ - φ0 where it is small against its largest: how far the compaction reaches. Two codes approach each other from both sides
-# as they are refined, and differ by 15 to 35 % there under deep beads (docs/numerics.md)
+# error of an exponent on (φ - φ0) over its largest: how far the compaction reaches. Two codes approach each other from both
+# sides as they are refined; where φ - φ0 is a twentieth of its largest they differ by half of it (docs/numerics.md)
 REACH = 0.2
 
 
@@ -196,7 +196,8 @@ class CompactedZone:
         data = np.concatenate([observed.filling_factor, [found.tip_depth]])
         n = data.size - 1
         contrast = np.abs(here[:n] - observed.beside)
-        reach = REACH * contrast * (1.0 - np.minimum(contrast / max(float(np.max(contrast)), 1e-12), 1.0))
+        share = np.clip(contrast / max(float(np.max(contrast)), 1e-12), 1e-6, 1.0)
+        reach = -REACH * contrast * np.log(share)
         by_speed = (predict(log_p_m, log_speed + 0.02) - here) / 0.02 * self.spread
         by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
         local = [
