@@ -4,7 +4,7 @@ Weightless matter without a stress at rest, so that the cone factor is the mean 
 Teh & Houlsby (1991): 4/3 (1 + ln I) (1.25 + I/2000), Lu et al. (2004): 3.4 + 1.6 ln I, both for a smooth cone of 30° half angle
 under an isotropic stress at rest; I is the rigidity G/c.
 
-    python benchmarks/cone_factor.py [--cells 5 8] [--rigidity 100]
+    python benchmarks/cone_factor.py [--cells 5 8] [--rigidity 100] [--width 20] [--end 13]
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from flat_punch import COHESION, RADIUS, read_resistance
 from labsim.records import Material, Motion, Projectile
 from labsim.sph import DropRun, DropSetting, simulate
 
-START, END = 4.0, 9.0  # tip radii
+START = 4.0  # tip radii
 
 
-def push_cone(cells: int, rigidity: float, speed: float, point: float = 0.0) -> DropRun:
-    """From START to END tip radii; the cone begins in the ground. speed m/s, point radius in tip radii."""
+def push_cone(
+    cells: int, rigidity: float, speed: float, point: float = 0.0, width: float = 10.0, end: float = 9.0
+) -> DropRun:
+    """From START to end tip radii; the cone begins in the ground. speed m/s; radius of the point, half width in tip radii."""
     shear = rigidity * COHESION
     law = (("cohesion", COHESION), ("shear_modulus", shear), ("bulk_modulus", 10 * shear))
     return simulate(
@@ -32,9 +34,9 @@ def push_cone(cells: int, rigidity: float, speed: float, point: float = 0.0) -> 
             filling_factor=0.5,
             gravity=0.0,
             spacing=RADIUS / cells,
-            width=10 * RADIUS,
-            depth=14 * RADIUS,
-            motion=Motion("pushed", START * RADIUS, (("speed", speed), ("end_depth", END * RADIUS))),
+            width=width * RADIUS,
+            depth=(end + 5.0) * RADIUS,
+            motion=Motion("pushed", START * RADIUS, (("speed", speed), ("end_depth", end * RADIUS))),
         )
     )
 
@@ -47,6 +49,8 @@ def main() -> None:
     parser.add_argument("--rigidity", type=float, nargs="+", default=[100.0])
     parser.add_argument("--speed", type=float, default=0.5)
     parser.add_argument("--point", type=float, default=0.0)
+    parser.add_argument("--width", type=float, default=20.0, help="half width of the ground, tip radii")
+    parser.add_argument("--end", type=int, default=13, help="depth where the push ends, tip radii")
     given = parser.parse_args()
     for rigidity in given.rigidity:
         teh = 4 / 3 * (1 + math.log(rigidity)) * (1.25 + rigidity / 2000)
@@ -54,10 +58,10 @@ def main() -> None:
             f"rigidity {rigidity:g}: Teh & Houlsby {teh:.2f}, Lu et al. {3.4 + 1.6 * math.log(rigidity):.2f}"
         )
         for cells in given.cells:
-            run = push_cone(cells, rigidity, given.speed, given.point)
-            found = [read_resistance(run, (at, at + 1.0)) for at in (5.0, 6.0, 7.0, 8.0)]
+            run = push_cone(cells, rigidity, given.speed, given.point, given.width, given.end)
+            found = [read_resistance(run, (at, at + 2.0)) for at in range(5, given.end, 2)]
             print(
-                f"  R/dx {cells}: {', '.join(f'{each:.2f}' for each in found)} over the tip radii 5 to 9; energy "
+                f"  R/dx {cells}: {', '.join(f'{each:.2f}' for each in found)} over two tip radii each from 5 on; energy "
                 f"{run.energy_error:+.1%}, contact {run.energy_share('contact'):+.1%}, viscosity {run.viscous_share:.1%}, "
                 f"{run.wall:.0f} s",
                 flush=True,

@@ -25,6 +25,12 @@ def remember(arguments: Sequence[str]) -> None:
     _arguments[:] = [str(each) for each in arguments]
 
 
+def specify(option: str, value: str) -> None:
+    """Say an option of this command line that repeats a part of what it makes."""
+    if _arguments:
+        _arguments.extend((option, value))
+
+
 def describe() -> dict[str, Any] | None:
     """What makes the result that is being written, or None outside the command line."""
     if not _arguments:

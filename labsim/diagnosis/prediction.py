@@ -32,16 +32,6 @@ class Prediction:
         return abs(self.deviation) > MISSES
 
 
-def describe(row: Prediction) -> str:
-    """``T_s, 1 mm: 2.31 ± 0.10 against 3.00 ± 0.10 ms (-4.9 σ)``."""
-    factor, unit, digits = people(row)
-    return (
-        f"{row.name}: {row.predicted * factor:.{digits}f} ± {row.predicted_sigma * factor:.{digits}f} against "
-        f"{row.observed * factor:.{digits}f} ± {row.observed_sigma * factor:.{digits}f}"
-        f"{' ' + unit if unit else ''} ({row.deviation:+.1f} σ)"
-    )
-
-
 def people(row: Prediction) -> tuple[float, str, int]:
     """Factor, unit and digits in which people see a figure."""
     return {

@@ -1,7 +1,7 @@
 """What an effect is: the records that its file is made of and is called with.
 
 An effect is a file with module-level names (docs/effects.md has them in a table): title, kind, parameters, leaves,
-references, expect, needs, remedy, applies(campaign) and at least one of change_setting(setting, values, place) and
+references, expect, says, needs, remedy, applies(campaign) and at least one of change_setting(setting, values, place) and
 change_instrument(instrument, values, place). Every effect is a nested extension of the nominal model: at the null of its
 parameters it changes nothing, bit for bit.
 """
@@ -170,6 +170,14 @@ class Effect:
     remedy: str = (
         ""  # what to do about it; {value} is its first parameter. Where it says nothing, its kind does
     )
+
+    says: tuple[str, str] | None = (
+        None  # the title where the first parameter lies below its null, and above it
+    )
+
+    def say(self, value: float) -> str:
+        """What is wrong at a value of the first parameter, as a sentence without its end."""
+        return self.says[value > self.amplitudes[0].null] if self.says else self.title
 
     def applies(self, campaign: Campaign) -> str:
         """Empty if the effect can be at work in this campaign, else the reason why not."""

@@ -209,6 +209,18 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
             f"{remedy!r} is not a sentence; write text, in which {{value}} is the first parameter",
         ) from None
 
+    says = getattr(module, "says", None)
+    if says is not None and not (
+        isinstance(says, tuple)
+        and len(says) == 2
+        and all(isinstance(each, str) and each.strip() for each in says)
+    ):
+        raise EffectError(
+            file,
+            "says",
+            f"{says!r} is not two titles; write what is wrong below the first parameter's null, and above it",
+        )
+
     def reason_against(campaign: Campaign) -> str:
         law = campaign.material.law
         missing = [name for name in needs if name not in list_numbers(law)]
@@ -237,6 +249,7 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
         resolve=resolve,
         description=inspect.cleandoc(module.__doc__ or ""),
         remedy=remedy,
+        says=says,
     )
 
 

@@ -24,7 +24,15 @@ from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from ..sph import solver_hash
 from .law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
-from .phrases import CERTAIN, say_amount, say_combination, say_hypothesis, say_probability
+from .phrases import (
+    CERTAIN,
+    say_amount,
+    say_combination,
+    say_hypothesis,
+    say_probability,
+    shown_unit,
+    state_p_value,
+)
 from .remedies import say_remedy
 
 NUMERICAL_DEPTH = (
@@ -63,10 +71,10 @@ def _name_calibrated(campaign: Campaign, samples: FloatArray) -> dict[str, Any]:
     return {"name": name, "unit": unit, **summarise(samples)}
 
 
-def say_calibrated(campaign: Campaign, value: float, digits: str = ".2f") -> str:
+def say_calibrated(campaign: Campaign, value: float) -> str:
     """``1.35 kPa``: a value (SI) of what is calibrated, as people see it."""
     _, unit, factor = show_parameter(campaign.material.law)
-    return f"{value * factor:{digits}} {unit}"
+    return f"{value * factor:.3g} {unit}"
 
 
 def is_pushed(bench: Workbench) -> bool:
@@ -103,7 +111,7 @@ def campaign_calibration_lines(found: Calibration) -> str:
         lines.append(f"  {name} = {q['mean']:.4g} ± {q['sd']:.2g}")
     lines += [
         f"  {say_count(found.bench)}, {scans} scan{'s' * (scans != 1)}{beside}; χ² {found.fit.chi_square:.0f} for "
-        f"{found.fit.points} data (p = {found.p_value:.2g})",
+        f"{found.fit.points} data ({state_p_value(found.p_value)})",
         f"  scatter of ln {label} from sample to sample {found.scatter.mean:.3f} ± {found.scatter.sd:.3f}"
         f" ({found.bench.terms.scatter:.2g} in use)",
         f"  R-hat {found.posterior.r_hat:.3f}, {found.posterior.ess:.0f} independent samples; "
@@ -223,15 +231,22 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
     }
 
 
+LEADS = {
+    "sample": "The sample is not as stated",
+    "measurement": "The measurement is off",
+    "numerics": "The simulation's numerics are off",
+}  # by kind of cause; of all others the simulation is wrong
+
+
 def say_verdict(found: Diagnosis) -> str:
-    """The verdict as one sentence that a laboratory can act on; numbers are medians of the posteriors."""
+    """The verdict as a laboratory can act on it, in two sentences; numbers are medians of the posteriors."""
     best, probability = found.verdict.probabilities[0]
     if found.verdict.word == "unknown":
         missing = f"what is missing {say_missing(found)}"
         if comes_nearest(found):
             missing = (
                 f"{say_hypothesis(found.best.hypothesis)} comes nearest, but does not predict drops that no fit has seen "
-                f"(p = {found.predicted:.2g})"
+                f"({state_p_value(found.predicted)})"
             )
         return (
             "The simulation is wrong in a way that no listed cause explains (probability "
@@ -244,26 +259,33 @@ def say_verdict(found: Diagnosis) -> str:
             f"The nominal simulation explains these data at {label} = {nominal} "
             f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
         )
-    parts = []
-    for name in best:
-        effect = found.bench.effects[name]
-        parameter = effect.amplitudes[0]
-        amount = say_amount(
-            parameter, float(np.median(found.posterior_extended.samples(f"{name}.{parameter.name}")))
-        )
-        for shape in (each for each in effect.parameters if each.shape):  # eta s^n says nothing without n
-            amount += f", {shape.name} = {say_amount(shape, shape.null)}"
-        title = effect.title[0].lower() + effect.title[1:]
-        parts.append(f"{title} ({name}: {parameter.name} = {amount})")
+    kinds = {found.bench.effects[name].kind for name in best}
+    lead = LEADS.get(next(iter(kinds)), "") if len(kinds) == 1 else ""
+    causes = ", and ".join(_say_cause(found, name) for name in best)
     apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in found.verdict.named[1:])
-    hardly = f" (these data hardly tell it from {apart})" if apart else ""
+    hardly = f", hardly told from {apart}" if apart else ""
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
     return (
-        f"The simulation is wrong because {' and '.join(parts)}, with probability {say_probability(probability)}{hardly}; with "
-        f"{' + '.join(best)} {label} {moved}, and "
-        f"{say_gain(found.gain, say_records(found.bench))}."
+        f"{lead or 'The simulation is wrong'}: {causes}; probability {say_probability(probability)}{hardly}. With it, {label} "
+        f"{moved}, and {say_gain(found.gain, say_records(found.bench))}."
     )
+
+
+def _say_cause(found: Diagnosis, name: str) -> str:
+    """``the pixels are larger than stated (factor 1.06, 90 %: 1.05 to 1.07)``."""
+    effect = found.bench.effects[name]
+    if not effect.amplitudes:
+        return effect.title[0].lower() + effect.title[1:]
+    parameter = effect.amplitudes[0]
+    q = _quantiles(found.posterior_extended, f"{name}.{parameter.name}")
+    factor, unit = shown_unit(parameter)
+    middle, low, high = (f"{q[key] * factor:.3g}" for key in ("q50", "q05", "q95"))
+    amount = f"{parameter.name.replace('_', ' ')} {middle} {unit}".rstrip() + f", 90 %: {low} to {high}"
+    for shape in (each for each in effect.parameters if each.shape):  # eta s^n says nothing without n
+        amount += f"; {shape.name.replace('_', ' ')} {say_amount(shape, shape.null)}"
+    title = effect.say(q["q50"])
+    return f"{title[0].lower()}{title[1:]} ({amount})"
 
 
 def say_gain(gain: Gain, records: str = "drops") -> str:
@@ -274,7 +296,11 @@ def say_gain(gain: Gain, records: str = "drops") -> str:
         return f"held-out {records} were predicted within the noise without it"
     if gain.rms_nominal <= gain.rms_noise:
         return "held-out drops, whose own free fall fixes contact and speed, were predicted within the noise without it"
-    return f"on held-out {records} {100 * gain.fraction_removed:.0f} % of the removable discrepancy is gone"
+    before, after, noise = (
+        f"{1e2 * each:.1f} %" if records == "pushes" else f"{1e6 * each:.3g} µm"
+        for each in (gain.rms_nominal, gain.rms_extended, gain.rms_noise)
+    )
+    return f"held-out {records} are missed by {after} instead of {before} ({noise} are expected)"
 
 
 def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
@@ -300,7 +326,7 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         f"{gain.log_score_difference:+.1f} ± {gain.log_score_difference_sigma:.1f}"
     )
     lines.append(
-        f"  nominal model: p = {found.p_value:.2g}; scatter between samples {found.scatter.mean:.3f} of ln {label}"
+        f"  nominal model: {state_p_value(found.p_value)}; scatter between samples {found.scatter.mean:.3f} of ln {label}"
     )
     if missed := say_misfit(found.misfit):
         lines.append(f"  the nominal model {missed}")

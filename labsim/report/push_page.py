@@ -22,7 +22,7 @@ from ..inference.observations.push_model import PushModel
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .campaign_figures import COLOURS, draw_causes, draw_held_out, draw_p_m
-from .campaign_tables import say_calibrated, say_gain, say_verdict
+from .campaign_tables import say_calibrated, say_verdict
 from .cause_words import BADGES, describe_causes
 from .look import GREY, INK, new_figure
 from .page import read_picture, show_number, write_html
@@ -169,8 +169,7 @@ def write_push_diagnosis(
         )
     words = (
         f"Each push is held out once and predicted from the others: rms {100 * gain.rms_nominal:.1f} % with the nominal model, "
-        f"{100 * gain.rms_extended:.1f} % with {fits[-1][0]}, {100 * gain.rms_noise:.1f} % expected of a true model; "
-        f"{say_gain(gain, 'pushes')}."
+        f"{100 * gain.rms_extended:.1f} % with {fits[-1][0]}, {100 * gain.rms_noise:.1f} % expected of a true model."
     )
     return _write(
         found, views, folder, tiles, found.verdict.word, BADGES[found.verdict.word],

@@ -8,6 +8,7 @@ from ..diagnosis.prediction import Prediction, people
 from ..diagnosis.summary import SummaryDiagnosis
 from ..inference.planar import ALPHA, READINGS
 from ..inference.summary import REFERENCE_P_M, SummaryCalibration
+from .phrases import state_p_value
 
 VERDICTS = {
     "none": "what was not calibrated is predicted within its errors",
@@ -61,7 +62,7 @@ def calibration_lines(calibration: SummaryCalibration) -> str:
 
 
 def diagnosis_lines(diagnosis: SummaryDiagnosis) -> str:
-    """The one sentence and the one table."""
+    """What is missed in words, and the table."""
     lines = [
         diagnosis.sentence,
         "",
@@ -97,7 +98,7 @@ def scaling_lines(diagnosis: SummaryDiagnosis) -> list[str]:
 
 def verdict_text(diagnosis: SummaryDiagnosis) -> str:
     return (
-        f"verdict: {diagnosis.verdict.word} (p = {diagnosis.p_value:.2g} for all predictions together): "
+        f"verdict: {diagnosis.verdict.word} ({state_p_value(diagnosis.p_value)} for all predictions together): "
         f"{VERDICTS[diagnosis.verdict.word]}"
     )
 

@@ -86,6 +86,7 @@ BROKEN = {
     "no references": ("references = (", "sources = (", ["references", "tuple of texts"]),
     "unknown observable": ('"penetration_depth": 1', '"depth": 1', ["expect", "penetration_depth"]),
     "remedy not a sentence": ('expect = {', 'remedy = "{other}"\nexpect = {', ["remedy", "first parameter"]),
+    "one title for two": ('kind = "', 'says = ("Lighter",)\nkind = "', ["says", "two titles"]),
     "sign not a sign": ('"penetration_depth": 1', '"penetration_depth": 2', ["expect", "-1, 0 or 1"]),
     "changes nothing": ("def change_setting", "def change_nothing", ["change_setting", "at least one"]),
     "two arguments": ("(setting, values, place)", "(setting, values)", ["change_setting", "3 arguments"]),

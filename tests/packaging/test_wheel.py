@@ -127,3 +127,4 @@ def test_an_installed_wheel_runs_the_demo(installed: Path, tmp_path: Path) -> No
     labsim(installed, tmp_path, "demo", store=os.environ.get("LABSIM_STORE"))
     for name in ("calibration.json", "diagnosis.json", "posterior.nc", "report.html"):
         assert (tmp_path / "labsim-demo" / name).stat().st_size > 300, name
+    assert (tmp_path / "labsim-demo" / "clay" / "report.html").is_file()

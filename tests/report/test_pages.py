@@ -146,7 +146,7 @@ def test_every_section_in_order_with_its_numbers(name: str, request: pytest.Fixt
 def test_the_verdict_is_the_first_sentence(effect: Path) -> None:
     page = Page(effect / "report.html")
     text = page.text
-    assert text.index("The simulation is wrong because") < text.index("What was measured")
+    assert text.index("The simulation is wrong: ") < text.index("What was measured")
 
 
 def test_a_hostile_name_stays_text(effect: Path) -> None:

@@ -6,6 +6,7 @@ from labsim.effects import LogNormal, Parameter
 from labsim.sph import Numerics
 
 title = "The artificial viscosity stops the projectile"
+says = ("The artificial viscosity is smaller than stated", "The artificial viscosity stops the projectile")
 kind = "numerics"
 IN_USE = Numerics().alpha  # settings with another α are scaled alike
 

@@ -3,6 +3,7 @@
 from labsim.effects import LogNormal, Parameter, list_thrown
 
 title = "The bulk modulus differs"
+says = ("The dust is softer than its bulk modulus says", "The dust is stiffer than its bulk modulus says")
 kind = "material"
 needs = ("bulk_modulus", "shear_to_bulk")
 

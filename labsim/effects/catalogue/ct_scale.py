@@ -3,6 +3,7 @@
 from labsim.effects import Normal, Parameter
 
 title = "The grey-to-density factor of the CT is off"
+says = ("The scanner's grey levels read too low", "The scanner's grey levels read too high")
 kind = "measurement"
 parameters = (
     Parameter(

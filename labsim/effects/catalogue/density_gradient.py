@@ -4,6 +4,7 @@ from labsim.effects import Normal, Parameter, deepest_dust, list_thrown
 from labsim.sph.setting import LEAST_GRADED, LOOSEST
 
 title = "The filling factor changes with depth"
+says = ("The dust is looser with depth", "The dust is denser with depth")
 kind = "sample"
 needs = ("filling_gradient", "phi_1")
 

@@ -3,6 +3,7 @@
 from labsim.effects import Normal, Parameter
 
 title = "The sample is denser or looser than stated"
+says = ("The sample is looser than stated", "The sample is denser than stated")
 kind = "sample"
 needs = ("phi_1",)
 

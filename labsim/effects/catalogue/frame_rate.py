@@ -3,6 +3,7 @@
 from labsim.effects import Normal, Parameter
 
 title = "The frame rate is not the stated rate"
+says = ("The camera runs slower than stated", "The camera runs faster than stated")
 kind = "measurement"
 parameters = (
     Parameter(

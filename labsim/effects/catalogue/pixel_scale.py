@@ -3,6 +3,7 @@
 from labsim.effects import Normal, Parameter
 
 title = "The pixel size is not the stated size"
+says = ("The pixels are smaller than stated", "The pixels are larger than stated")
 kind = "measurement"
 parameters = (
     Parameter(

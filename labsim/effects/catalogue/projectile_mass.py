@@ -5,6 +5,7 @@ from dataclasses import replace
 from labsim.effects import LogNormal, Parameter, all_pushed
 
 title = "The projectiles' mass is not the stated mass"
+says = ("The projectiles are lighter than stated", "The projectiles are heavier than stated")
 kind = "projectile"
 parameters = (
     Parameter(

@@ -8,6 +8,10 @@ from labsim.calibrated import scale_value
 from labsim.effects import Normal, Parameter
 
 title = "The strength drifts from drop to drop"
+says = (
+    "The samples grow weaker from the first drop to the last",
+    "The samples grow stronger from the first drop to the last",
+)
 kind = "sample"
 parameters = (
     Parameter(

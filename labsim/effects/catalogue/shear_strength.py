@@ -3,6 +3,7 @@
 from labsim.effects import LogNormal, Parameter
 
 title = "The shear strength is a multiple of √(Σ|T|)"
+says = ("The shear strength is less than √(Σ|T|)", "The shear strength is more than √(Σ|T|)")
 kind = "material"
 needs = ("shear_factor",)
 

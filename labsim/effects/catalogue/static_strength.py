@@ -3,6 +3,10 @@
 from labsim.effects import LogNormal, Parameter
 
 title = "The static strength is not the dynamic one"
+says = (
+    "The static strength is less than the dynamic one",
+    "The static strength is more than the dynamic one",
+)
 kind = "material"
 needs = ("p_m",)
 parameters = (

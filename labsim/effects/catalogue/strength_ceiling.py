@@ -3,6 +3,10 @@
 from labsim.effects import Normal, Parameter
 
 title = "The filling factor where the strength diverges differs"
+says = (
+    "The strength diverges at a smaller filling factor",
+    "The strength diverges at a larger filling factor",
+)
 kind = "material"
 needs = ("phi_2",)
 

@@ -3,6 +3,10 @@
 from labsim.effects import Normal, Parameter
 
 title = "The slope of the strength differs"
+says = (
+    "The strength grows slower with the filling factor than stated",
+    "The strength grows faster with the filling factor than stated",
+)
 kind = "material"
 needs = ("delta",)
 

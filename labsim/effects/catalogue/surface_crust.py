@@ -3,6 +3,7 @@
 from labsim.effects import LogNormal, Normal, Parameter
 
 title = "The top of the sample is denser or fluffier than the bulk"
+says = ("The top of the sample is fluffier than the bulk", "The top of the sample is denser than the bulk")
 kind = "sample"
 needs = ("crust_excess", "phi_1")
 

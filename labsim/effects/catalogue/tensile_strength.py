@@ -5,6 +5,7 @@ import math
 from labsim.effects import LogNormal, Parameter
 
 title = "The tensile strength differs by a factor"
+says = ("The tensile strength is less than stated", "The tensile strength is more than stated")
 kind = "material"
 needs = ("tensile_log10_a",)
 parameters = (
