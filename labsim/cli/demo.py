@@ -66,7 +66,7 @@ def demo(
             calibration = calibrate_summary(
                 read_campaign(example("guettler2009")), opened, seed=seed, **settings
             )
-            found, lines = _write(diagnose_summary(calibration, opened, **settings), folder, Case.dust)
+            found, lines = _write(diagnose_summary(calibration, opened, **settings), folder, case)
             summary |= found
             said.append(
                 f"Projectiles dropped into dust (guettler2009, published figures)\n{lines}\n{_say_where(found, folder)}"
@@ -80,7 +80,7 @@ def demo(
 
 
 def _write(found: Diagnosis | SummaryDiagnosis, folder: Path, case: Case) -> tuple[dict[str, Any], str]:
-    """Write one case's files, so that ``labsim rerun`` of its folder repeats this case; its summary and lines."""
+    """Write files of a case, so that ``labsim rerun`` of the folder repeats what lies there; summary and lines."""
     from ..report.outputs import write_result  # matplotlib is slow to import and only needed at the end
     from ..report.tables import calibration_lines
 
