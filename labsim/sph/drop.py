@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -31,6 +32,13 @@ LEAST = 0.1  # of the skin: a list that allows less is made anew
 SHORTEST = (
     1e-3  # of the first step: a shorter one follows a single point that has collapsed, and would never end
 )
+
+
+BOOK_CLOSES = (
+    0.02  # energy error below which a run stands; 99 of 100 stay below 0.017, half of them below 0.0013
+)
+HALVINGS = 2  # of the step, where it does not close
+HELPED = 0.7  # of the error may be left by a halving; where more is left, the step is not the reason
 
 
 @dataclass
@@ -158,7 +166,7 @@ def evolve(
                 raise _blown_up(setting, made, body[TIME])
             if collapsed:  # after the stop there is nothing left to wait for
                 limit = body[TIME]
-            fresh = done == steps
+            fresh = 1 < steps == done  # a single step may have been the last one allowed
             if body[SPEED] >= 0.0 and stop_step is None and not led:
                 stop_step = made
                 limit = min(limit, body[TIME] * (1 + setting.after_stop))
@@ -192,16 +200,39 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     """Run one drop or push; time zero is the start, at the depth that its motion says: 0 is the first contact of the tip with
     the undisturbed surface. Where it starts deeper, there is no dust in the projectile.
 
+    The book of energy judges the run: where it does not close, or where a point collapsed, the run is made again with half the
+    step, at most ``HALVINGS`` times and as long as that helps.
+
     progress is called now and then with the time reached, in s. Raises SimulationError (setting out of range, or the
     run blew up: then the message names its parameters).
     """
     check_setting(setting)
+    best, trouble = None, None
+    for halvings in range(HALVINGS + 1):
+        try:
+            run = _simulate_once(setting, setting.numerics.courant / 2**halvings, progress)
+        except SimulationError as error:
+            trouble = trouble or error
+            continue
+        before, best = best, run if best is None or abs(run.energy_error) < abs(best.energy_error) else best
+        if abs(best.energy_error) < BOOK_CLOSES:
+            return best
+        if before is not None and abs(run.energy_error) > HELPED * abs(before.energy_error):
+            break
+    if best is None:
+        raise cast(SimulationError, trouble)
+    missing = f"its book of energy does not close: {best.energy_error:+.1%}"
+    return replace(best, warnings=(*best.warnings, missing))
+
+
+def _simulate_once(setting: DropSetting, courant: float, progress: Callable[[float], None] | None) -> DropRun:
     began = time.perf_counter()
     dust, wall = place_particles(setting)
     body = start_body(setting)
     watch = None if progress is None else lambda reached, state: progress(reached)
     _fill_elastic(setting, dust)
-    result = evolve(setting, dust, wall, body, watch)
+    stepped = setting.replace(numerics=replace(setting.numerics, courant=courant))
+    result = evolve(stepped, dust, wall, body, watch)
     per_unit = 2 * math.pi if setting.geometry == "axisymmetric" else 1.0
     return make_run(
         setting, result.log, result.stop_step, result.at_stop, result.state,

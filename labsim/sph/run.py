@@ -50,7 +50,7 @@ class DropRun:
     rebuilds: int
     wall: float  # s
     momentum_error: float  # of m v
-    energy_error: float  # of the kinetic energy at contact
+    energy_error: float  # of the kinetic energy at contact and what forces from outside gave
     energies: dict[str, float]  # J (planar: J/m), between contact and the end of the run
     viscous_share: float  # heat of artificial viscosity until the stop, of the energy that was brought in
     solver: str
@@ -153,7 +153,7 @@ def make_run(
         brought = float(np.sum(np.abs(log[1:, 3]) * np.diff(log[:, 0])))
     sources = ("kinetic_at_contact", "gravity", "driver")
     spent = sum(energies[sink] for sink in energies if sink not in sources)
-    scale = max(map(abs, energies.values())) if led else kinetic_0
+    scale = max(map(abs, energies.values())) if led else kinetic_0 + max(-energies["outside"], 0.0)
     energy_error = (kinetic_0 + energies["gravity"] + driver - spent) / (scale or 1.0)
     given = kinetic_0 + body_mass * setting.gravity * log[stop, 1] + log[stop, 10]
     viscous_share = float(log[stop, 6]) / (given or 1.0)

@@ -248,6 +248,22 @@ def test_a_run_that_blows_up_names_its_parameters():
         simulate(a_drop(numerics=Numerics(courant=12.0)))
 
 
+def test_a_run_whose_book_of_energy_does_not_close_is_made_with_a_shorter_step(monkeypatch):
+    """Rough and slow: the step that the sound asks for is too long for Coulomb's friction, and the book shows it."""
+    setting = DropSetting(
+        Projectile("hemisphere", 0.5e-3, 3.3249e-6),
+        0.1,
+        Material(p_m=4000.0, contact_friction=0.45),
+        spacing=1.25e-4,
+    )
+    found = simulate(setting)
+    assert abs(found.energy_error) < 0.02 and not found.warnings and found.setting == setting
+    monkeypatch.setattr(drop_module, "HALVINGS", 0)
+    first = simulate(setting)
+    assert abs(first.energy_error) > 0.05 and first.steps < 0.6 * found.steps
+    assert any("book of energy" in warning for warning in first.warnings)
+
+
 def test_clamp_near_the_upper_limit_is_reported():
     """A dust that hardly grows stronger is driven up to φ2: the run says so."""
     weak = Material(p_m=2.0, phi_2=0.2, tensile_log10_a=-1.0, bulk_modulus=45e3)
