@@ -127,6 +127,11 @@ class Instrument:
         0.0  # m, standard deviation of additional point spread, in quadrature with the assumed one
     )
 
+    gauge_shift: float = (
+        0.0  # Pa of the tip's section that a force gauge reads too much at the start of a push
+    )
+    gauge_time: float = 300.0  # s, over which that goes
+
     static_factor: float = 1.0  # static over dynamic compressive strength: a test at rest measures the former
 
     def replace(self, **changes: float) -> Instrument:
@@ -143,6 +148,12 @@ class Instrument:
     def stated_filling_factor(self, filling_factor: FloatArray) -> FloatArray:
         """Filling factor that the stated grey calibration gives, before blur."""
         return np.asarray(filling_factor) * self.ct_scale
+
+    def stated_resistance(self, resistance: FloatArray, depth: FloatArray, speed: float) -> FloatArray:
+        """Resistance (Pa) that a gauge reads at depths (m) that a push at a speed (m/s) reaches, of a true one (Pa)."""
+        return np.asarray(resistance) + self.gauge_shift * np.exp(
+            -np.asarray(depth) / (speed * self.gauge_time)
+        )
 
 
 Values = Mapping[str, float]

@@ -266,6 +266,8 @@ def say_verdict(found: Diagnosis) -> str:
     hardly = f", hardly told from {apart}" if apart else ""
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
+    if probability < 0.5:
+        lead = "These data do not decide; most probable"
     return (
         f"{lead or 'The simulation is wrong'}: {causes}; probability {say_probability(probability)}{hardly}. With it, {label} "
         f"{moved}, and {say_gain(found.gain, say_records(found.bench))}."

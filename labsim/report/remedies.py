@@ -12,7 +12,7 @@ from .phrases import say_hypothesis
 
 KEEP = "keep it in the model: labsim simulate --model model.toml"
 BY_KIND = {
-    "material": f"{KEEP}. Another measurement of the dust would check it, such as a static strength test",
+    "material": f"{KEEP}. Another measurement of the material would check it, such as a static strength test",
     "sample": f"prepare the sample anew, or {KEEP}",
     "contact": KEEP,
     "projectile": KEEP,

@@ -29,7 +29,7 @@ CAMPAIGN = dataclasses.replace(
     ),
 )
 EFFECTS = list_effects(CAMPAIGN)
-PUSHES = {"partial_drainage"}  # of pushes alone: tests/inference/test_pushes.py
+PUSHES = {"partial_drainage", "gauge_warming"}  # of pushes alone: tests/inference/test_pushes.py
 PHYSICS = [name for name, effect in EFFECTS.items() if effect.costs_runs and name not in PUSHES]
 RADIUS, SPACING, PIXEL = 5.0e-4, 1.25e-4, 2.0e-5
 NAMES = {
@@ -47,6 +47,7 @@ NAMES = {
     "sample_drift": {"relative_change"},
     "strength_trend": {"growth", "azimuth"},
     "partial_drainage": {"gain", "half_speed"},
+    "gauge_warming": {"shift", "time"},
     "contact_friction": {"mu"},
     "side_friction": {"force_per_length"},
     "gravity": {"g"},

@@ -12,7 +12,7 @@ import pytest
 from labsim.calibrated import read_value
 from labsim.campaign import read_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
-from labsim.effects import list_places, load_effect
+from labsim.effects import Instrument, list_places, load_effect
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.grid import INERTIA, hasten, set_nominal_drop, set_push
@@ -97,14 +97,39 @@ def test_pushes_at_all_speeds_share_a_run_where_no_rate_matters() -> None:
     assert len(runs) == 1
 
 
-def test_six_real_soundings_in_clay_grow_with_speed(pushes: list[ObservedPush], tmp_path: Path) -> None:
+def test_six_real_soundings_in_clay_grow_with_speed(pushes: list[ObservedPush], shared_store: str) -> None:
     """All at the slowest and the fastest speed; the regression of all 25 says 14 ± 1 % of the net resistance a decade."""
     chosen = [push for push in pushes if push.name in SIX]
     campaign = replace(read_campaign(TILLER), drops=tuple(push.drop for push in chosen))
-    bench, nominal = prepare(campaign, RunStore(tmp_path), measurements=Measurements(list(chosen)), workers=2)
+    bench, nominal = prepare(
+        campaign, RunStore(shared_store), measurements=Measurements(list(chosen)), workers=2
+    )
     rated = fit_hypothesis(bench, ("strength_rate",), (nominal.log_p_m, {"strength_rate": 0.1}))
     assert rated.evidence > nominal.evidence + 3.0
     value, sigma = rated.values["strength_rate"], math.sqrt(rated.covariance[1, 1])
     assert 0.0 < sigma < 0.04 and abs(value - 0.14) < 2.5 * math.hypot(sigma, 0.01)
     gain = measure_gain(predict_held_out(bench, nominal), predict_held_out(bench, rated))
     assert gain.fraction_removed > 0.8 and gain.log_score_difference > 3.0
+
+
+def test_a_gauge_that_is_too_warm_is_told_from_a_strength_that_grows(
+    pushes: list[ObservedPush], shared_store: str
+) -> None:
+    """Even clay whose strength grows with depth, read by a gauge that begins 60 kPa too high and cools within 300 s."""
+    rng = np.random.default_rng(5)
+    made = []
+    for push in pushes:
+        true = 4e5 + 2.5e4 * (push.depth - 10.0)
+        read = Instrument(gauge_shift=6e4).stated_resistance(true, push.depth, push.impact_speed)
+        noise = 0.02 * rng.standard_normal() + push.sigma * rng.standard_normal(push.depth.size)
+        made.append(replace(push, resistance=np.log(read) + noise))
+    campaign = replace(read_campaign(TILLER), drops=tuple(push.drop for push in made))
+    bench, nominal = prepare(
+        campaign, RunStore(shared_store), measurements=Measurements(list(made)), workers=2
+    )
+    start = (nominal.log_p_m, {"gauge_warming": 3e4})
+    warm = fit_hypothesis(bench, ("gauge_warming",), start)
+    rated = fit_hypothesis(bench, ("strength_rate",), (nominal.log_p_m, {"strength_rate": 0.1}))
+    assert warm.evidence > max(rated.evidence, nominal.evidence) + 3.0
+    value, sigma = warm.values["gauge_warming"], math.sqrt(warm.covariance[1, 1])
+    assert abs(value - 6e4) < 2.5 * sigma and sigma < 2e4

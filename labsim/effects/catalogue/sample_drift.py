@@ -9,8 +9,8 @@ from labsim.effects import Normal, Parameter
 
 title = "The strength drifts from drop to drop"
 says = (
-    "The samples grow weaker from the first drop to the last",
-    "The samples grow stronger from the first drop to the last",
+    "The samples grow weaker from the first to the last",
+    "The samples grow stronger from the first to the last",
 )
 kind = "sample"
 parameters = (

@@ -89,7 +89,10 @@ class PushModel:
 
     def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """ln of the resistance over 1 Pa where the profile has its reference, (n,)."""
-        return np.full(self.data.size, code[0])
+        # the profile makes up for what differs with depth: the resistance is as large as it was measured
+        measured = np.exp(self.data)
+        read = instrument.stated_resistance(measured, self.observed.depth, float(np.exp(instant.log_speed)))
+        return code[0] + np.log(np.maximum(read, 0.01 * measured) / measured)
 
     def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Nothing depends on when it began."""
