@@ -1,4 +1,4 @@
-"""Cone soundings in clay at ten speeds: is the cause found, in how many halves, and how often where there is none?
+"""Cone soundings in clay at nine speeds: is the cause found, in how many halves, and how often where there is none?
 
     python benchmarks/soundings.py CAMPAIGN [--shuffles 200] [--halves 50] [--seed 1] [--store runs]
 

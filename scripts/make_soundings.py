@@ -31,9 +31,9 @@ class Site:
 
 
 SITES = (
-    Site("0_tiller_flotten", "tiller", "Cone soundings at ten speeds in sensitive clay, Tiller-Flotten", (10.0, 18.0),
+    Site("0_tiller_flotten", "tiller", "Cone soundings at nine speeds in sensitive clay, Tiller-Flotten", (10.0, 18.0),
          (2e4, 3e5), "clay below a dry crust; below 10 m the resistance rises evenly with depth"),
-    Site("1_oysand", "oysand", "Cone soundings at ten speeds in sand and silt, Øysand", (8.2, 15.2),
+    Site("1_oysand", "oysand", "Cone soundings at nine speeds in sand and silt, Øysand", (8.2, 15.2),
          (1e5, 4e6), "layered sand and silt: drainage and layers are not simulated"),
     Site("2_stjordal", "stjordal", "Cone soundings at five speeds in clayey silt, Stjørdal", (6.0, 18.0),
          (2e4, 6e5), "clayey silt with layers"),

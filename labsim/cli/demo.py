@@ -59,7 +59,7 @@ def demo(
             place = folder / "clay" if case is Case.both else folder
             summary["clay"], lines = _write(clay, place, Case.clay)
             said.append(
-                f"A cone pushed into clay at ten speeds (tiller, measured)\n{lines.partition(END)[0]}\n"
+                f"A cone pushed into clay at nine speeds (tiller, measured)\n{lines.partition(END)[0]}\n"
                 f"{_say_where(summary['clay'], place)}"
             )
         if case is not Case.clay:

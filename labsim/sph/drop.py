@@ -9,7 +9,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 
@@ -207,7 +206,8 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     run blew up: then the message names its parameters).
     """
     check_setting(setting)
-    best, trouble = None, None
+    best: DropRun | None = None
+    trouble: SimulationError | None = None
     for halvings in range(HALVINGS + 1):
         try:
             run = _simulate_once(setting, setting.numerics.courant / 2**halvings, progress)
@@ -220,7 +220,7 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
         if before is not None and abs(run.energy_error) > HELPED * abs(before.energy_error):
             break
     if best is None:
-        raise cast(SimulationError, trouble)
+        raise trouble if trouble else _blown_up(setting, 0, 0.0)
     missing = f"its book of energy does not close: {best.energy_error:+.1%}"
     return replace(best, warnings=(*best.warnings, missing))
 

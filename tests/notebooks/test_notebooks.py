@@ -31,6 +31,16 @@ NOTEBOOKS = {
             r"nominal: T_s ratio 2\.4",
         ],
     ),
+    "real_soundings": (
+        3,
+        [
+            r"verdict: effect",
+            r"strength_rate +0\.9\d",
+            r"nominal: rms [45]",
+            r"with the cause: rms [12]\.",
+            r": none, 0\.[5-9]",
+        ],
+    ),
     "find_the_cause": (3, [r"verdict: effect", r"pixel_scale +(1|0\.9\d*)\n"]),
 }
 

@@ -60,17 +60,17 @@ def labsim(installed: Path, tmp_path: Path, *arguments: str, store: str | None =
 def test_the_wheel_holds_code_and_the_data_of_the_demo(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     in_git = subprocess.run(
-        ["git", "ls-files", "data/guettler2009", "labsim"],
+        ["git", "ls-files", "data/guettler2009", "data/campaigns/tiller", "labsim"],
         cwd=ROOT,
         check=True,
         capture_output=True,
         text=True,
     ).stdout.split()
     for name in in_git:
-        assert name.replace("data/guettler2009", "labsim/data/guettler2009") in names
+        assert name.removeprefix("labsim/") in {each.removeprefix("labsim/") for each in names}, name
     assert "labsim/data/guettler2009/campaign.toml" in names
     assert not any(name.startswith(("tests/", "data/", "notebooks/")) for name in names)
-    assert wheel.stat().st_size < 2_000_000
+    assert wheel.stat().st_size < 2_500_000  # of which the soundings in clay are 0.4 MB
 
 
 def test_the_sdist_builds_the_same_wheel(tmp_path: Path, wheel: Path) -> None:

@@ -34,7 +34,7 @@ parameters = (
         text="A steel cone of 36 mm in wet ground follows in some minutes.",
     ),
 )
-leaves = "Fast pushes read higher, or lower, than slow ones, by the same pressure in weak and in strong ground, and less with depth."
+leaves = "Fast pushes read higher, or lower, than slow ones: the same pressure in weak and in strong ground, less with depth."
 remedy = (
     "let the gauge take the temperature of the ground before the push, and note its zero before and after"
 )
