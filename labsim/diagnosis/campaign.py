@@ -237,10 +237,11 @@ def diagnose_campaign(
         )
 
     found = judge_scatters(campaign, open_with, seed=seed)
-    bench, nominal, best = found.bench, found.nominal, found.best
+    bench, nominal = found.bench, found.nominal
+    best = allow_for_codes(bench, nominal, found.best)
     held_nominal, posterior = _predict(bench, nominal, seed, progress)
     held_best, extended = (
-        (held_nominal, posterior) if best is nominal else _predict(bench, best, seed, progress)
+        (held_nominal, posterior) if found.best is nominal else _predict(bench, best, seed, progress)
     )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
     warnings += warn_unused_scans(bench)
@@ -257,9 +258,8 @@ def diagnose_campaign(
             f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"
         )
     sampled = {fit.hypothesis: chain.calibrated for fit, chain in ((nominal, posterior), (best, extended))}
-    averaged = average_p_m(
-        found.verdict, nominal, found.rivals, campaign.p_m_range, sampled=sampled, seed=seed
-    )
+    rivals = [allow_for_codes(bench, nominal, fit) for fit in found.rivals]
+    averaged = average_p_m(found.verdict, nominal, rivals, campaign.p_m_range, sampled=sampled, seed=seed)
     about = best if found.verdict.word == "effect" else nominal
     untestable = list_untestable(bench, about)
     learned, tangents = None, found.unknown.tangents
@@ -294,6 +294,14 @@ def diagnose_campaign(
         warnings=(*doubts, *warnings),
         doubts=len(doubts),
     )
+
+
+def allow_for_codes(bench: Workbench, nominal: Fit, fit: Fit) -> Fit:
+    """Let p_m beside a cause of the material be what another code would say: codes differ in what such a cause does by a share of
+    that, and p_m makes up for it (docs/error-budget.md)."""
+    if not any(bench.effects[name].kind == "material" for name in fit.hypothesis):
+        return fit
+    return replace(fit, between_codes=bench.terms.change_of_strength * abs(fit.log_p_m - nominal.log_p_m))
 
 
 def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:

@@ -233,7 +233,8 @@ def sample_fit(
 ) -> Posterior:
     """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors.
 
-    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the other shapes.
+    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the others; beside a cause
+    of the material, by what another code would say.
     """
     target = make_target(bench, fit)
     if any(bench.costs_runs(name) for name in fit.hypothesis):
@@ -248,7 +249,7 @@ def sample_fit(
         backend=backend,
         progress=progress,
     )
-    moved, width = fit.over_shapes
+    moved, width = fit.log_p_m_beside
     if width > 0.0:
         name = posterior.names[0]
         p_m = posterior.data.posterior[name]

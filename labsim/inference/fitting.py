@@ -53,6 +53,7 @@ class Fit:
     # of ln p_m over the shapes of the effect that were fitted, by their evidence: mean minus this one's, standard deviation
     over_shapes: tuple[float, float] = (0.0, 0.0)
     unsettled: float = 0.0
+    between_codes: float = 0.0  # standard deviation of ln p_m that another code would say beside this cause
 
     @property
     def drops(self) -> DropsBlock:
@@ -62,9 +63,15 @@ class Fit:
         return first
 
     @property
-    def log_p_m_over_shapes(self) -> tuple[float, float]:
-        """Mean and standard deviation of ln p_m, those of the effect's shapes included."""
+    def log_p_m_beside(self) -> tuple[float, float]:
+        """What ln p_m is moved by, and widened by, beyond this fit: the shapes of its effect, and other codes."""
         moved, width = self.over_shapes
+        return moved, math.hypot(width, self.between_codes)
+
+    @property
+    def log_p_m_over_shapes(self) -> tuple[float, float]:
+        """Mean and standard deviation of ln p_m, those beside this fit included."""
+        moved, width = self.log_p_m_beside
         return self.log_p_m + moved, math.hypot(math.sqrt(self.covariance[0, 0]), width)
 
 

@@ -1,13 +1,16 @@
 """p_m over causes: a mixture whose share, middle and spread are known, cut at the stated range."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from labsim.diagnosis.average import average_p_m
+from labsim.diagnosis.campaign import allow_for_codes
 from labsim.diagnosis.judge import Verdict
 from labsim.inference.fitting import Fit
+from labsim.inference.observations.drop_terms import Terms
 
 RANGE = (300.0, 6000.0)
 
@@ -63,3 +66,22 @@ def test_one_certain_cause_has_its_own_p_m_with_its_shapes():
 def test_no_draw_lies_outside_the_range_and_unknown_alone_leaves_the_nominal_model():
     draws = average_p_m(Verdict("unknown", [(("unknown",), 1.0)]), a_fit((), 294.0, 0.02), [], RANGE)
     assert draws.min() >= 300.0 and draws.max() < 330.0
+
+
+def test_beside_a_cause_of_the_material_p_m_may_be_what_another_code_says():
+    effects = {
+        "tensile_strength": SimpleNamespace(kind="material"),
+        "pixel_scale": SimpleNamespace(kind="measurement"),
+    }
+    bench = SimpleNamespace(effects=effects, terms=Terms())
+    nominal = a_fit((), 900.0, 0.02)
+    wide = allow_for_codes(bench, nominal, a_fit(("tensile_strength",), 1200.0, 0.05))
+    assert wide.between_codes == pytest.approx(0.4 * math.log(1200 / 900))
+    draws = average_p_m(Verdict("effect", [(("tensile_strength",), 1.0)]), nominal, [wide], RANGE)
+    assert np.std(np.log(draws)) == pytest.approx(math.hypot(0.05, wide.between_codes), rel=0.02)
+    assert np.mean(np.log(draws)) == pytest.approx(math.log(1200.0), abs=2e-3)
+    scale = a_fit(("pixel_scale",), 1200.0, 0.05)
+    assert (
+        allow_for_codes(bench, nominal, scale) is scale
+        and allow_for_codes(bench, nominal, nominal) is nominal
+    )
