@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +84,16 @@ def read_gauge(table: Table) -> Gauge:
 
 
 def read_force(path: Path, gauge: Gauge, radius: float) -> ForceRecord:
-    """A record inside its window. radius : of the tip, m. Raises MeasurementError."""
+    """A record inside its window. radius : of the tip, m. A file that did not change is read once. Raises MeasurementError."""
+    try:
+        state = path.stat()
+    except OSError:  # the format's reader says what is wrong
+        return _read(path, gauge, radius, (0, 0))
+    return _read(path, gauge, radius, (state.st_mtime_ns, state.st_size))
+
+
+@lru_cache(maxsize=128)
+def _read(path: Path, gauge: Gauge, radius: float, state: tuple[int, int]) -> ForceRecord:
     section = math.pi * radius**2
     formats = list_modules(__name__, "labsim.force_formats")
     claimed = (m for m in formats.values() if path.suffix.lower() in getattr(m, "SUFFIXES", ()))

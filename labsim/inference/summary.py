@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import emcee
 import numpy as np
 
 from ..records import Campaign, Drop, FloatArray
 from ..sph import DropRun, DropSetting
 from .emulator import Emulator, fit_emulator
 from .planar import SPACING, campaign_setting
-from .posterior import Posterior, uncompiled
+from .posterior import Posterior, sample
 from .published import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
 from .readings import FigureLikelihood, NumericalError, Reading, integrate_reading, list_readings
 from .runs import Progress, RunStore, require_stopped
@@ -200,30 +198,13 @@ def _sample(
         inside = (ln_p_m >= low) & (ln_p_m <= high)
         return np.where(inside, likelihood(np.clip(ln_p_m, low, high)), -np.inf)
 
-    walkers, steps, discard = 32, 1500, 200
-    random = np.random.default_rng(seed)
-    start = random.uniform(low, high, (walkers, 1))
-    sampler = emcee.EnsembleSampler(walkers, 1, log_probability, vectorize=True)
-    sampler.random_state = np.random.RandomState(seed).get_state()
-    for number, _state in enumerate(sampler.sample(start, iterations=steps), start=1):
-        if progress is not None and number % 500 == 0:
-            progress(number, steps, "sampling p_m")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # arviz announces its own rewriting at every import
-        import arviz
-    chain = np.exp(np.swapaxes(sampler.get_chain(discard=discard), 0, 1)[:, :, 0])
-    data = arviz.from_dict(
-        posterior={"p_m_Pa": chain},
-        sample_stats={"lp": np.swapaxes(sampler.get_log_prob(discard=discard), 0, 1)},
-        attrs={"unit": "Pa", "prior": f"flat in ln p_m between {limits[0]:g} and {limits[1]:g} Pa"},
-    )
-    with uncompiled(arviz.Numba):
-        r_hat, ess = (float(each(data)["p_m_Pa"]) for each in (arviz.rhat, arviz.ess))
-    return Posterior(
-        names=("p_m_Pa",),
-        data=data,
-        r_hat=r_hat,
-        ess=ess,
-        steps=steps,
-        autocorrelation=float(sampler.get_autocorr_time(discard=discard, quiet=True)[0]),
+    # walkers begin all over the range
+    return sample(
+        log_probability,
+        ("p_m_Pa",),
+        np.array([0.5 * (low + high)]),
+        np.array([[(0.1 * (high - low)) ** 2]]),
+        seed=seed,
+        transform=lambda _name, values: np.exp(values),
+        progress=progress,
     )
