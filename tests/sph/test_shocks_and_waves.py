@@ -89,7 +89,7 @@ def test_compaction_shock(geometry, case):
 
 
 @pytest.mark.xfail(
-    strict=True, reason="docs/numerics.md: the drop's viscosity overshoots in a shock without shear strength"
+    strict=True, reason="docs/shocks.md: the drop's viscosity overshoots in a shock without shear strength"
 )
 def test_compaction_shock_with_the_viscosity_of_a_drop():
     modulus, p_m, speed, phi, _, front = SHOCKS[1]
