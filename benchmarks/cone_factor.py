@@ -21,16 +21,23 @@ START = 4.0  # tip radii
 
 
 def push_cone(
-    cells: int, rigidity: float, speed: float, point: float = 0.0, width: float = 10.0, end: float = 9.0
+    cells: int,
+    rigidity: float,
+    speed: float,
+    point: float = 0.0,
+    width: float = 10.0,
+    end: float = 9.0,
+    friction: float = 0.0,
 ) -> DropRun:
-    """From START to end tip radii; the cone begins in the ground. speed m/s; radius of the point, half width in tip radii."""
+    """From START to end tip radii; the cone begins in the ground. speed m/s; radius of the point, half width in tip radii;
+    coefficient of Coulomb friction, rough where it is large: matter at the cone then yields before it slides."""
     shear = rigidity * COHESION
     law = (("cohesion", COHESION), ("shear_modulus", shear), ("bulk_modulus", 10 * shear))
     return simulate(
         DropSetting(
             projectile=Projectile("cone", RADIUS, 1e-6, shape=(("point_radius", point * RADIUS),)),
             impact_speed=1.0,
-            material=Material(law="von_mises", constants=law),
+            material=Material(law="von_mises", constants=law, contact_friction=friction),
             filling_factor=0.5,
             gravity=0.0,
             spacing=RADIUS / cells,
@@ -49,6 +56,7 @@ def main() -> None:
     parser.add_argument("--rigidity", type=float, nargs="+", default=[100.0])
     parser.add_argument("--speed", type=float, default=0.5)
     parser.add_argument("--point", type=float, default=0.0)
+    parser.add_argument("--friction", type=float, default=0.0, help="of the cone; 1 and above: rough")
     parser.add_argument("--width", type=float, default=20.0, help="half width of the ground, tip radii")
     parser.add_argument("--end", type=int, default=13, help="depth where the push ends, tip radii")
     given = parser.parse_args()
@@ -58,7 +66,7 @@ def main() -> None:
             f"rigidity {rigidity:g}: Teh & Houlsby {teh:.2f}, Lu et al. {3.4 + 1.6 * math.log(rigidity):.2f}"
         )
         for cells in given.cells:
-            run = push_cone(cells, rigidity, given.speed, given.point, given.width, given.end)
+            run = push_cone(cells, rigidity, given.speed, given.point, given.width, given.end, given.friction)
             found = [read_resistance(run, (at, at + 2.0)) for at in range(5, given.end, 2)]
             print(
                 f"  R/dx {cells}: {', '.join(f'{each:.2f}' for each in found)} over two tip radii each from 5 on; energy "

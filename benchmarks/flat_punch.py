@@ -46,11 +46,11 @@ def push_punch(geometry: str, cells: int, rigidity: float = 500.0, speed: float 
 
 
 def read_resistance(run: DropRun, between: tuple[float, float] = BETWEEN) -> float:
-    """Mean pressure on the section over that part of the way, in cohesions."""
+    """Mean pressure of the tip on its section over that part of the way, in cohesions."""
     low, high = (share * RADIUS for share in between)
     part = (run.depth >= low) & (run.depth <= high)
-    return float(np.trapezoid(run.force[part], run.depth[part]) / np.ptp(run.depth[part])
-                 / base_area(run.setting) / COHESION)  # fmt: skip
+    work = np.trapezoid(run.force[part], run.depth[part]) - np.ptp(run.shaft_work[part])
+    return float(work / np.ptp(run.depth[part]) / base_area(run.setting) / COHESION)
 
 
 def main() -> None:

@@ -3,7 +3,8 @@
     python benchmarks/soundings.py CAMPAIGN [--shuffles 200] [--halves 50] [--seed 1] [--store runs]
 
 The whole campaign; its pushes at the most frequent speed alone; the speeds dealt out anew among the pushes, so that none can
-matter; halves of the pushes drawn at random. Printed: how often strength_rate stands first, its probability, its gain a decade.
+matter; halves of the pushes drawn at random. Printed: how often strength_rate stands first, its inclusion probability (alone or
+beside another cause), its gain a decade.
 Beside it the regression of each push's mean ln net resistance on log10 of the speed, which needs no simulation.
 """
 
@@ -68,9 +69,8 @@ def regress(pushes: Sequence[ObservedPush]) -> tuple[float, float, float, float]
 
 
 def say(found: Judgement) -> tuple[float, str]:
-    """Probability of the cause, and a line."""
-    probabilities = dict(found.verdict.probabilities)
-    p = probabilities.get(CAUSE, 0.0)
+    """Inclusion probability of the cause, alone or beside another, and a line."""
+    p = found.verdict.inclusion.get(CAUSE[0], 0.0)
     fit = next((fit for fit in found.rivals if fit.hypothesis == CAUSE), None)
     size = ""
     if fit is not None:

@@ -39,13 +39,16 @@ def name_column(law: str) -> str:
 
 def read_value(material: Material) -> float:
     """Its value in SI, the law's default where nothing is stated."""
+    return read_constant(material, find_parameter(material.law)[0])
+
+
+def read_constant(material: Material, name: str) -> float:
+    """A parameter of the material's law in SI, the law's default where nothing is stated."""
     from .sph.materials import find_law
 
-    module = find_law(material.law)
-    name = module.CALIBRATED.name
     if hasattr(material, name):
         return float(getattr(material, name))
-    default = next(each.default for each in module.PARAMETERS if each.name == name)
+    default = next(each.default for each in find_law(material.law).PARAMETERS if each.name == name)
     return float(dict(material.constants).get(name, default))
 
 

@@ -28,6 +28,15 @@ class Verdict:
     probabilities: list[tuple[Hypothesis, float]]
 
     @property
+    def inclusion(self) -> dict[str, float]:
+        """Posterior inclusion probability of each cause: alone or beside another."""
+        total: dict[str, float] = {}
+        for hypothesis, probability in self.probabilities:
+            for name in hypothesis:
+                total[name] = total.get(name, 0.0) + probability
+        return total
+
+    @property
     def named(self) -> list[tuple[Hypothesis, float]]:
         """The first and, where it is an effect, what the data hardly tell from it: until NAMED is reached, MOST_NAMED at most."""
         if self.word != "effect":

@@ -10,12 +10,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from types import ModuleType
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..calibrated import set_value
+from ..calibrated import read_constant, set_value
 from ..records import Campaign, FloatArray, Projectile
 from ..records import Motion as Led
 from ..sph import DropSetting
@@ -178,23 +177,15 @@ def hasten(setting: DropSetting) -> DropSetting:
         return setting
     constants = dict(material.constants)
     if constants.get("rate_eta", 0.0) > 0.0:
-        exponent = constants.get("rate_exponent", default_of(law, "rate_exponent"))
-        constants["rate_eta"] *= ratio**-exponent
+        constants["rate_eta"] *= ratio ** -read_constant(material, "rate_exponent")
     if constants.get("rate_log", 0.0) > 0.0:
-        constants["rate_reference"] = (
-            constants.get("rate_reference", default_of(law, "rate_reference")) * ratio
-        )
+        constants["rate_reference"] = read_constant(material, "rate_reference") * ratio
     return setting.replace(
         material=material.replace(constants=tuple(constants.items())),
         strength_rate=setting.strength_rate * ratio**-setting.strength_rate_exponent,
         motion=replace(setting.motion, values=tuple((values | {"speed": fast}).items())),
         duration=setting.duration / ratio,
     )
-
-
-def default_of(law: ModuleType, name: str) -> float:
-    """What a law takes for a parameter that nobody states."""
-    return float(next(each.default for each in law.PARAMETERS if each.name == name))
 
 
 @dataclass

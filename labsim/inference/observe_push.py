@@ -48,6 +48,12 @@ class ObservedPush:
         return self.drop.name
 
     @property
+    def feels_shaft(self) -> bool:
+        """A force is what holds the whole projectile, a pressure the tip's own: a cone's gauge sits behind it."""
+        assert self.drop.gauge is not None
+        return self.drop.gauge.is_force
+
+    @property
     def impact_speed(self) -> float:
         """m/s, of the push."""
         return self.speeds[0].value

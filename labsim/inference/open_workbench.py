@@ -64,9 +64,11 @@ def open_workbench(
     of_speeds: list[RunFeatures] = []
     dropped = [drop for drop in drops if not isinstance(drop, ObservedPush)]
     pushed = [drop for drop in drops if isinstance(drop, ObservedPush)]
+    of_tips = [push for push in pushed if not push.feels_shaft]
+    of_rods = [push for push in pushed if push.feels_shaft]
     grouped = [
         each
-        for seen in (dropped, pushed)
+        for seen in (dropped, of_tips, of_rods)
         for each in group_alike((drop.drop.projectile, drop) for drop in seen).items()
     ]
     for projectile, group in grouped:
@@ -78,7 +80,8 @@ def open_workbench(
             ground = measure_ground(pushes)
             numbers = sorted({int(n) for push in pushes for n in push.windows})
             reference = numbers[len(numbers) // 2]
-            features.append(RunFeatures(len(families), table, encode_push))
+            encode = partial(encode_push, whole=pushes[0].feels_shaft)
+            features.append(RunFeatures(len(families), table, encode))
             families.append(Family(projectile, nodes, False, few, pushed=True))
             models += [PushModel(push, table, ground, reference) for push in pushes]
             continue

@@ -151,8 +151,8 @@ def sample(
     log_probability : (m, d) -> (m,). backend : an HDF5 file; where it holds a chain of the same target and seed, that chain is
     gone on with and ends as it would have ended unbroken, step for step; any other content is replaced.
     Walkers move by differences of others (ter Braak 2006): autocorrelation times of 7 steps in two dimensions and 37 in twelve,
-    where the stretch move has 29 and 100. R-hat compares the halves of four groups of walkers: single walkers are not independent chains (emcee, Foreman-Mackey et
-    al. 2013).
+    where the stretch move has 29 and 100. R-hat compares the halves of four groups of walkers: single walkers are not
+    independent chains (emcee, Foreman-Mackey et al. 2013).
     """
     d = len(names)
     walkers = max(32, WALKERS_PER_PARAMETER * d)

@@ -53,6 +53,7 @@ class Push:
 
     setting: DropSetting
     depth: FloatArray
+    shaft_work: FloatArray
     energies: dict[str, float]
     stopped: bool
 

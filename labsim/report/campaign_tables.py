@@ -171,6 +171,9 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "remedy": say_remedy(found, suggestions),
         "p_value": found.p_value,
         "causes": causes,
+        "inclusion_probability": {
+            name: total for name, total in found.verdict.inclusion.items() if total >= 1e-4
+        },
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
         "classes": group_classes(found.confusable),
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
@@ -262,14 +265,23 @@ def say_verdict(found: Diagnosis) -> str:
     kinds = {found.bench.effects[name].kind for name in best}
     lead = LEADS.get(next(iter(kinds)), "") if len(kinds) == 1 else ""
     causes = ", and ".join(_say_cause(found, name) for name in best)
-    apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in found.verdict.named[1:])
+    beside = [(h, p) for h, p in found.verdict.named[1:] if set(best) < set(h)]
+    others = [each for each in found.verdict.named[1:] if each not in beside]
+    apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in others)
     hardly = f", hardly told from {apart}" if apart else ""
+    sure = say_probability(probability)
+    if beside:  # the cause is there either way
+        partners = " or ".join(
+            f"{say_hypothesis([name for name in h if name not in best])} ({say_probability(p)})"
+            for h, p in beside
+        )
+        sure = f"{say_probability(found.verdict.inclusion[best[0]])}, alone ({sure}) or with {partners}"
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
     if probability < 0.5:
         lead = "These data do not decide; most probable"
     return (
-        f"{lead or 'The simulation is wrong'}: {causes}; probability {say_probability(probability)}{hardly}. With it, {label} "
+        f"{lead or 'The simulation is wrong'}: {causes}; probability {sure}{hardly}. With it, {label} "
         f"{moved}, and {say_gain(found.gain, say_records(found.bench))}."
     )
 
@@ -284,7 +296,8 @@ def _say_cause(found: Diagnosis, name: str) -> str:
     factor, unit = shown_unit(parameter)
     middle, low, high = (f"{q[key] * factor:.3g}" for key in ("q50", "q05", "q95"))
     amount = f"{parameter.name.replace('_', ' ')} {middle} {unit}".rstrip() + f", 90 %: {low} to {high}"
-    for shape in (each for each in effect.parameters if each.shape):  # eta s^n says nothing without n
+    # eta s^n says nothing without n; a shape of nought is none
+    for shape in (each for each in effect.parameters if each.shape and each.null != 0.0):
         amount += f"; {shape.name.replace('_', ' ')} {say_amount(shape, shape.null)}"
     title = effect.say(q["q50"])
     return f"{title[0].lower()}{title[1:]} ({amount})"

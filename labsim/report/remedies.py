@@ -35,7 +35,8 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
     said = []
     if len(found.verdict.named) > 1 and suggestions:
         names = " from ".join(say_hypothesis(hypothesis) for hypothesis, _ in found.verdict.named[:2])
-        said.append(f"first tell {names}: {suggestions[0].change}")
+        change = suggestions[0].change
+        said.append(change if " to tell " in change else f"first tell {names}: {change}")
     for name in found.verdict.probabilities[0][0]:
         effect = found.bench.effects[name]
         value = 0.0

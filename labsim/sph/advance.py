@@ -110,7 +110,7 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
         for i in range(n):
             s.weight[i] = density[i] * ring[i]
             area[i] = mass[i] / s.weight[i]
-        force = press(near, body[SPEED], numbers.friction, s, lost)
+        force = press(near, body[SPEED], numbers.friction, dt, s, lost)
         if numbers.front > 0.0:
             find_fronts(np.uint64(0), np.uint64(n), axisymmetric, numbers.front, h, s)
         if images > 0:
@@ -192,6 +192,7 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
         if led:  # the driver carries the projectile, and pushes the dust
             row[5] += dt * (gravity * numbers.body_mass - force - pushed)
             row[10] = last[10] - dt * (force + pushed) * body[SPEED]
+        row[11] = last[11] - dt * lost[2] * body[SPEED]
         if (
             far > 0
             or abs(body[TIP] - stretch.body_origin) > allowed

@@ -96,7 +96,7 @@ def evolve(
     )
     log = np.zeros((4096, len(LOG)))
     log[0, 1], log[0, 2] = -body[TIP], -body[SPEED]
-    lost = np.zeros(2)
+    lost = np.zeros(3)
     fixed = np.nonzero(wall)[0].astype(np.uint32)
     part = 1 - 0.5 / numerics.smoothing
     numbers = Numbers(

@@ -17,7 +17,7 @@ from .tips import make_profile
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
     HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, SHEAR,
     DISTANCE, NX, NZ, THICKNESS, GRIP, WALL_RATE, COMPACTION, DIFFUSIVITY, EXCHANGE, EXCHANGED,
-    CRUSHING, PUSH_X, PUSH_Z,
+    CRUSHING, PUSH_X, PUSH_Z, YIELD_SQUARE,
 ) = range(len(Rows._fields))  # fmt: skip
 
 WALL_LAYERS = 3  # of particles held still at the sides and the bottom
@@ -58,6 +58,7 @@ def fill_at_rest(
     state[MASS] = state[DENSITY] * state[RING] * state[AREA]
     state[PRESSURE] = pressure
     state[SOUND] = sound
+    state[YIELD_SQUARE] = np.inf
     state[DXX] = state[DZZ] = state[THICKNESS] = 1.0
     for k, row in enumerate(own):
         state[len(Rows._fields) + k] = row

@@ -18,7 +18,8 @@ import math
 from ._jit import compiled
 from .profile import find_surface
 
-SLIP_SPEED = 1.0e-3  # m/s, over which friction turns round
+UPRIGHT = 1.0e-9  # of the normal along z: less is a shaft
+STICK = 0.5  # the largest share of its slip that friction takes from a particle in a step: more would turn the slip round
 TOUCHING = 1.05  # half thicknesses of a cell at which contact begins to close
 CLOSING = 0.2  # of a half thickness, over which it closes
 COVERING = 0.5  # of that, from which on all that lies behind the cell is in contact
@@ -139,12 +140,13 @@ def strain_against_wall(near, speed_z, s):
 
 
 @compiled
-def press(near, speed_z, friction, s, energy):
+def press(near, speed_z, friction, dt, s, energy):
     """The adjoint of ``strain_against_wall``: take the wall's share out of M (what a particle's stress brings into the sum of
     forces), set fx, fz to the wall's push, and return the force on the projectile along z (per radian or metre).
 
     Where the traction would pull there is no force, and grip is set to 0: energy[0] is the power that the stresses spent on
-    the wall's strain all the same; energy[1] is the power lost to friction.
+    the wall's strain all the same; energy[1] is the power lost to friction, energy[2] the part of the force that acts where the
+    surface is upright: on the shaft.
     """
     distance, nx, nz, grip, wall_rate, ring, mass = (
         s.distance,
@@ -157,10 +159,11 @@ def press(near, speed_z, friction, s, energy):
     )
     density, u, w, sxx, szz, sxz, pressure = s.density, s.u, s.w, s.sxx, s.szz, s.sxz, s.pressure
     bxx, bxz, bzz, mxx, mxz, mzx, mzz = s.gxx, s.gxz, s.gzz, s.mxx, s.mxz, s.mzx, s.mzz
-    fx, fz = s.push_x, s.push_z
+    fx, fz, yield_square = s.push_x, s.push_z, s.yield_square
     force = 0.0
     taken = 0.0
     lost = 0.0
+    beside = 0.0
     for i in near:
         fx[i] = fz[i] = 0.0
         if grip[i] > 0.0:
@@ -184,13 +187,19 @@ def press(near, speed_z, friction, s, energy):
             px, pz = -held * volume * a, -held * volume * b
             if friction > 0.0:
                 slip = -u[i] * b + (w[i] - speed_z) * a
-                drag = friction * held * volume * slip / (abs(slip) + SLIP_SPEED)
+                # held < 0. Beyond what the matter bears in shear it yields; held as fast as a step allows it sticks
+                bound = math.sqrt(yield_square[i] / 3.0) * grip[i] * volume / (along_x * a + along_z * b)
+                drag = min(-friction * held * volume, bound)
+                drag = -slip * min(drag / max(abs(slip), 1e-30), STICK * mass[i] / dt)
                 px -= drag * b
                 pz += drag * a
                 lost -= drag * slip
             fx[i] = px
             fz[i] = pz
             force -= pz
+            if abs(b) < UPRIGHT:
+                beside -= pz
     energy[0] = taken
     energy[1] = lost
+    energy[2] = beside
     return force

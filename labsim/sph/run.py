@@ -35,13 +35,15 @@ class Particles:
 
 @dataclass(frozen=True)
 class DropRun:
-    """Arrays time (s, 0 at contact), depth (m), velocity (m/s, downwards), force (N, on the projectile) of shape (m,)."""
+    """Arrays time (s, 0 at contact), depth (m), velocity (m/s, downwards), force (N, on the projectile) and shaft_work (J since
+    contact, of the part of the force that acts along an upright surface) of shape (m,)."""
 
     setting: DropSetting
     time: FloatArray
     depth: FloatArray
     velocity: FloatArray
     force: FloatArray
+    shaft_work: FloatArray
     penetration_depth: float  # m, at the first v = 0, or where its path ended
     stopping_time: float  # s
     stopped: bool  # or led to the end of its path
@@ -189,6 +191,7 @@ def make_run(
         depth=log[keep, 1],
         velocity=log[keep, 2],
         force=log[keep, 3] * per_unit,
+        shaft_work=log[keep, 11] * per_unit,
         penetration_depth=float(depth),
         stopping_time=float(stopping_time),
         stopped=stop_step is not None,

@@ -16,7 +16,7 @@ Rows = namedtuple(
     "Rows",
     "x z u w mass area ring weight sound density initial sxx szz sxz pressure work elastic heat "
     "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz shear distance nx nz "
-    "thickness grip wall_rate compaction diffusivity exchange exchanged crushing push_x push_z",
+    "thickness grip wall_rate compaction diffusivity exchange exchanged crushing push_x push_z yield_square",
 )
 
 LOG = (
@@ -31,6 +31,7 @@ LOG = (
     "contact",
     "outside",
     "driver",
+    "shaft",
 )
 
 TIP, SPEED, TIME, FRICTION, LAST_STEP = range(5)  # what the array ``body`` holds: m, m/s (upwards), s, J, s
@@ -58,7 +59,7 @@ class Lines(NamedTuple):
     back: FloatArray
     nearby: FloatArray
     beyond: FloatArray
-    lost: FloatArray  # what contact spent in the last step and what friction did, W; (2,)
+    lost: FloatArray  # what contact spent in the last step and what friction did, W, and the force along a shaft, N; (3,)
 
 
 class Numbers(NamedTuple):

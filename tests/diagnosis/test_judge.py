@@ -46,3 +46,8 @@ def test_a_single_with_less_evidence_never_stands_before_one_with_more(gains, le
     assert sum(probability.values()) == pytest.approx(1.0)
     for (a, x), (b, y) in itertools.combinations(zip(names, gains, strict=True), 2):
         assert (x - y) * (probability[a,] - probability[b,]) > 0.0
+
+
+def test_a_cause_is_at_work_alone_or_beside_another():
+    verdict = Verdict("effect", [(("rate",), 0.6), (("rate", "gauge"), 0.3), (("none",), 0.1)])
+    assert verdict.inclusion == pytest.approx({"rate": 0.9, "gauge": 0.3, "none": 0.1})

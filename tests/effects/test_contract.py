@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
+from labsim.diagnosis.shapes import with_shape
 from labsim.effects import (
     CATALOGUE,
     HalfNormal,
@@ -29,9 +30,11 @@ from labsim.effects import (
 from labsim.effects.loading import list_own_files
 from labsim.errors import EffectError
 from labsim.inference.grid import set_nominal_drop
-from labsim.records import Material
+from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
 from labsim.sph.materials import list_laws
+from labsim.sph.materials._parts import strengthen
+from labsim.sph.materials.von_mises import make_constants
 
 DATA = Path(__file__).parents[2] / "data" / "guettler2009"
 
@@ -304,3 +307,22 @@ def test_needs_that_are_no_names(tmp_path):
     file.write_text(source.replace('needs = ("delta",)', 'needs = "delta"'))
     with pytest.raises(EffectError, match="needs"):
         load_file(file)
+
+
+@pytest.mark.parametrize("n", [0.0, 0.13, 0.4])
+def test_both_forms_of_a_rate_gain_the_same_a_decade_where_the_strength_is_stated(n):
+    """Cohesion is the strength at a thousand times the reference rate; there it grows by 0.14 of itself a decade."""
+    clay = Material(law="von_mises", constants=(("cohesion", 5e4), ("rate_reference", 2e-3)))
+    setting = DropSetting(Projectile("cone", 0.01, 1.0), 1.0, material=clay, spacing=2e-3)
+    effect = list_effects()["strength_rate"]
+    campaign = dataclasses.replace(reference_campaign(), material=clay)
+    place = list_places(campaign)[campaign.drops[0].name]
+    changed = with_shape(effect.for_campaign(campaign), n).apply(setting, {"per_decade": 0.14, "n": n}, place)
+    law = make_constants(changed)
+
+    def strength(decades: float) -> float:
+        return law.cohesion * strengthen(2.0 * 10.0**decades, law.rate)
+
+    assert strength(0.0) == pytest.approx(5e4)
+    assert (strength(1e-3) - strength(-1e-3)) / 2e-3 == pytest.approx(0.14 * 5e4, rel=1e-4)
+    assert strength(1.0) == pytest.approx(57e3) if n == 0.0 else strength(1.0) > 57.1e3

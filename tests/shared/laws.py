@@ -58,6 +58,7 @@ def run_law(setting: DropSetting) -> DropRun:
         depth=depth * np.sin(phase),
         velocity=setting.impact_speed * np.cos(phase),
         force=np.zeros_like(time),
+        shaft_work=np.zeros_like(time),
         penetration_depth=depth,
         stopping_time=stop,
         stopped=True,

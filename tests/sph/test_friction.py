@@ -1,9 +1,10 @@
-"""Coulomb friction between projectile and dust: a block that slides under a flat carries μ times its pressure in shear."""
+"""Friction between projectile and dust: Coulomb's where it slides, the shear strength of the matter where it is rough."""
 
 import numpy as np
 import pytest
 
-from labsim.records import Projectile
+from labsim.records import Material, Motion, Projectile
+from labsim.sph import DropRun, DropSetting, Numerics, simulate
 from labsim.sph import particles as rows
 from labsim.sph.bodies import elastic_material, fill_block, set_body
 from labsim.sph.drop import evolve
@@ -44,3 +45,56 @@ def test_a_block_that_slides_under_a_flat(friction):
     print(f"μ {friction}: shear over normal {-shear / normal:.4f}, heat {heat:.4e} J/m of {expected:.4e}")
     assert shear == pytest.approx(-friction * normal, abs=0.005 * normal)
     assert heat == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("speed", [0.25, 0.65])
+def test_a_rough_drop_balances_its_book_at_the_full_step(speed):
+    """Dust that sticks to the bead is not shaken: half the step gives the same depth, and no energy comes from nowhere."""
+    bead = Projectile("sphere", 5e-4, 1.5e-6)
+    rough = DropSetting(bead, speed, material=Material(p_m=1300.0, contact_friction=0.8), spacing=1e-4)
+    whole, half = (simulate(rough.replace(numerics=Numerics(courant=courant))) for courant in (0.9, 0.45))
+    print(f"energy {whole.energy_error:+.4f}, D {whole.penetration_depth / half.penetration_depth - 1:+.1e}")
+    assert abs(whole.energy_error) < 0.004
+    assert whole.penetration_depth == pytest.approx(half.penetration_depth, rel=1e-3)
+
+
+COHESION, RADIUS = 5e3, 5e-4  # Pa, m
+
+
+def push_cone(friction: float) -> DropRun:
+    """A cone of 30° into von Mises' matter of rigidity 100, from 4 to 9 radii deep at 5 spacings in a radius."""
+    law = (("cohesion", COHESION), ("shear_modulus", 100 * COHESION), ("bulk_modulus", 1000 * COHESION))
+    return simulate(
+        DropSetting(
+            Projectile("cone", RADIUS, 1e-6),
+            1.0,
+            material=Material(law="von_mises", constants=law, contact_friction=friction),
+            filling_factor=0.5,
+            gravity=0.0,
+            spacing=RADIUS / 5,
+            width=12 * RADIUS,
+            depth=14 * RADIUS,
+            motion=Motion("pushed", 4 * RADIUS, (("speed", 0.5), ("end_depth", 9 * RADIUS))),
+        )
+    )
+
+
+def test_a_rough_cone_in_clay():
+    """A rough cone meets 1.3 cohesions more than a smooth one says Lu et al. (2004), 2.4 Teh & Houlsby (1991); what its shaft
+    meets is no part of that, and not more than the shear strength on it."""
+    found = []
+    for friction in (0.0, 1.0):
+        run = push_cone(friction)
+        assert abs(run.energy_error) < 0.01
+        late = run.depth > 7 * RADIUS
+        way, section = np.ptp(run.depth[late]), np.pi * RADIUS**2 * COHESION
+        work = np.trapezoid(run.force[late], run.depth[late])
+        shaft = np.ptp(run.shaft_work[late])
+        found.append(((work - shaft) / way / section, shaft / way / section))
+    (smooth, nothing), (rough, shaft) = found
+    most = (
+        2 * (8.0 - 3**0.5) * 2 / 3**0.5
+    )  # in the middle of that way, of shear strength 2/√3 cohesion all over it
+    print(f"smooth {smooth:.2f}, rough {rough:.2f} cohesions; shaft {shaft:.2f} of at most {most:.2f}")
+    assert nothing == 0.0 and 0.0 < shaft < most
+    assert 1.3 < rough - smooth < 2.4

@@ -22,11 +22,12 @@ from ..run_parts import Push
 PROFILE = 3.0  # of ln strength in each window, prior width: as good as free
 
 
-def encode_push(run: DropRun | Push) -> FloatArray:
+def encode_push(run: DropRun | Push, whole: bool) -> FloatArray:
     """(2,): ln of the resistance, Pa on the tip's section, mean over the way by the driver's work: forces of single steps are
-    noisy. A nought where a drop has its stop."""
+    noisy. A nought where a drop has its stop. whole : with what holds the shaft."""
     radius = run.setting.projectile.tip_radius
-    force = run.energies["driver"] / float(run.depth[-1] - run.depth[0])
+    work = run.energies["driver"] - (0.0 if whole else float(run.shaft_work[-1]))
+    force = work / float(run.depth[-1] - run.depth[0])
     return np.array([np.log(force / (np.pi * radius**2)), 0.0])
 
 

@@ -158,6 +158,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         p = min(max(dilated, -constants.tension), crush * cap[i])
         limit = max(rub * (intercept + slope * p), 0.0)
         a, c, b = parts.return_radially(a, c, b, limit * limit)
+        s.yield_square[i] = limit * limit
         reference[i] = rho_new * parts.exponential(-p / bulk)
         pressure[i], sxx[i], szz[i], sxz[i] = p, a, c, b
         sound[i] = math.sqrt((bulk + 4.0 / 3.0 * shear) / rho_new)

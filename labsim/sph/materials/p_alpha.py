@@ -187,7 +187,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         h = max(constants.elastic_speed, 1.0 - constants.gain * (1.0 / zero - 1.0))
         distension[i] = 1.0 / zero
         a, c, b = parts.shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
-        a, c, b = parts.return_radially(a, c, b, (2.0 * rub * constants.cohesion) ** 2)
+        limit2 = (2.0 * rub * constants.cohesion) ** 2
+        a, c, b = parts.return_radially(a, c, b, limit2)
+        s.yield_square[i] = limit2
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * h * h * phi + 4.0 / 3.0 * shear) / rho_new)
         crushing[i] += 0.2 * (max(zero - before, 0.0) / before * per_dt - crushing[i])

@@ -292,7 +292,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         shear = shear_to_bulk * k
         exx, ezz, exz, spin = find_strain_rates(lxx[i], lzz[i], lxz[i], lzx[i], div)
         a, c, b = shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
-        a, c, b = return_radially(a, c, b, shear_factor * shear_factor * strength * tension)
+        limit2 = shear_factor * shear_factor * strength * tension
+        a, c, b = return_radially(a, c, b, limit2)
+        s.yield_square[i] = limit2
         sxx[i], szz[i], sxz[i] = a, c, b
         total = p
         stiffness = k * phi / x * (1.0 + 4.0 * third * shear_to_bulk)

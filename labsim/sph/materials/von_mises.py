@@ -96,6 +96,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         if len(constants.rate.on) > 0:
             limit2 *= parts.strengthen(parts.find_shear_rate(exx, ezz, exz), constants.rate) ** 2
         a, c, b = parts.return_radially(a, c, b, limit2)
+        s.yield_square[i] = limit2
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * rho_new / reference[i] + 4.0 * third * shear) / rho_new)
         crushing[i] = 0.0  # nothing is crushed, so nothing is exchanged
