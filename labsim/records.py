@@ -131,7 +131,8 @@ class Accelerometer:
 @dataclass(frozen=True)
 class Gauge:
     """What logs a push. depth_column, column : of a table, "" where the format has its own; unit, depth_unit : SI of one of their
-    numbers; sigma (of a row), offset_sigma : SI, N of a force, else Pa; scale_sigma : relative; window : m, what is compared."""
+    numbers; sigma (of a row), offset_sigma : SI, N of a force, else Pa; scale_sigma : relative; window : m, what is compared;
+    surface : m, where the record's depth has the surface."""
 
     depth_column: str
     column: str
@@ -142,6 +143,16 @@ class Gauge:
     offset_sigma: float
     scale_sigma: float
     window: tuple[float, float]
+    surface: float = 0.0
+
+    def per_pressure(self, section: float) -> float:
+        """What a number of the gauge is divided by to become Pa on a tip's section (m²)."""
+        return section if self.is_force else 1.0
+
+    @property
+    def feels_shaft(self) -> bool:
+        """A column of forces is what holds the whole projectile; pressures, and what penetrometers log, are the tip's own."""
+        return self.is_force and bool(self.column)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import struct
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from labsim.tables import Table
 
 ROOT = Path(__file__).resolve().parents[1]
 RADIUS = 5e-3
+TILLER = ROOT / "data" / "campaigns" / "tiller"
 DROP = """[drop]
 sequence = 1
 [projectile]
@@ -225,3 +228,122 @@ def test_a_long_record_is_read_quickly(tmp_path: Path) -> None:
     began = time.process_time()
     assert read_force(path, gauge(**NAMED), RADIUS).depth.size == 50_000
     assert time.process_time() - began < 1.0
+
+
+def write_profile(path: Path, counts: np.ndarray, step: float = 0.004, per_count: float = 0.0012) -> Path:
+    """A SnowMicroPen's file: its header's numbers and the counts."""
+    head = bytearray(512)
+    struct.pack_into(">hi", head, 0, 131, len(counts))
+    struct.pack_into(">ff", head, 6, step, per_count)
+    struct.pack_into(">i", head, 358, len(counts))
+    path.write_bytes(bytes(head) + counts.astype(">i2").tobytes())
+    return path
+
+
+def test_a_profile_of_a_snow_micro_pen(tmp_path: Path) -> None:
+    """The force of the tip over its section, from where the snow is said to begin."""
+    counts = np.concatenate([np.zeros(5000), np.full(20_000, 250)])
+    path = write_profile(tmp_path / "S31M0067.pnt", counts)
+    given = gauge(surface_mm=20.0, force_unit="N", window_mm=[1.0, 60.0], sigma=0.01)
+    record = read_force(path, given, 2.5e-3)
+    assert record.depth[0] == pytest.approx(1e-3, abs=5e-6) and record.depth[-1] == pytest.approx(
+        0.06, abs=5e-6
+    )
+    assert record.pressure == pytest.approx(250 * 0.0012 / (math.pi * 2.5e-3**2))
+    assert given.sigma == 0.01 and not given.feels_shaft
+
+
+def test_a_damaged_profile_is_one_line(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    whole = write_profile(tmp_path / "whole.pnt", rng.integers(0, 9000, 3000)).read_bytes()
+    refused = 0
+    for number in range(300):
+        content = bytearray(whole)
+        if number % 3 == 0:
+            content = content[: rng.integers(0, len(content))]
+        else:
+            for _ in range(4):
+                content[rng.integers(0, 400)] = rng.integers(0, 256)
+        path = tmp_path / "mutant.pnt"
+        path.write_bytes(bytes(content))
+        try:
+            record = read_force(path, gauge(force_unit="N"), 2.5e-3)
+            assert np.isfinite(record.pressure).all()
+        except MeasurementError as trouble:
+            refused += 1
+            assert "\n" not in str(trouble)
+    assert refused > 90
+
+
+def test_the_noise_of_a_force_is_noise_on_the_section(tmp_path: Path) -> None:
+    """The same record as forces and as pressures has the same errors."""
+    campaign = read_campaign(TILLER)
+    drop = campaign.drops[0]
+    radius = drop.projectile.tip_radius
+    section = math.pi * radius**2
+    depth = np.arange(0.0, 6.0, 0.01)
+    values = {"force_N": (6e5 + 2e4 * depth) * section, "pressure_Pa": 6e5 + 2e4 * depth}
+    errors = []
+    for column, sigma in (("force_N", 3e4 * section), ("pressure_Pa", 3e4)):
+        path = tmp_path / f"{column}.csv"
+        lines = [f"{d:.4f},{v!r}" for d, v in zip(depth.tolist(), values[column].tolist(), strict=True)]
+        path.write_text("\n".join([f"depth_m,{column}", *lines]) + "\n")
+        key, unit = column.split("_")
+        keys = {"depth_column": "depth_m", f"{key}_column": column, "force_unit": unit, "sigma": sigma}
+        given = read_gauge(Table(Path("drop.toml"), "record", keys))
+        pushed = replace(drop, gauge=given, record=replace(drop.record, path=path))
+        errors.append(observe_push(pushed, campaign).sigma)
+    assert errors[0] == pytest.approx(errors[1]) and errors[0].min() > 0.003
+
+
+GEF = """#GEFID= 1, 1, 0
+#REPORTCODE= GEF-CPT-Report, 1, 1, 2
+#COLUMN= 4
+#COLUMNINFO= 1, m, penetration length, 1
+#COLUMNINFO= 2, MPa, cone resistance, 2
+#COLUMNINFO= 3, MPa, friction, 3
+#COLUMNINFO= 4, MPa, pore pressure u2, 6
+#COLUMNVOID= 2, -999
+#MEASUREMENTVAR= 3, 0.80, -, net surface quotient of the cone tip
+#TESTID= S1
+#ZID= 31000, 1.5, 0.01
+#XYID= 31000, 100000, 400000, 0.1, 0.1
+#EOH=
+"""
+
+
+def write_sounding(path: Path) -> Path:
+    lines = [f"{0.02 * k:.2f} {0.5 + 0.01 * k:.3f} 0.010 {0.001 * k:.4f}" for k in range(100)]
+    lines[50] = "1.00 -999 0.010 0.0500"
+    path.write_text(GEF + "\n".join(lines) + "\n")
+    return path
+
+
+def test_a_dutch_sounding_is_corrected_for_its_water(tmp_path: Path) -> None:
+    """qt = qc + (1 - a) u with a = 0.8; a void is a row without a number."""
+    record = read_force(write_sounding(tmp_path / "S1.gef"), gauge(), 0.0178)
+    k = np.delete(np.arange(100), 50)
+    assert record.depth == pytest.approx(0.02 * k) and record.lost == 1
+    assert record.pressure == pytest.approx(1e6 * (0.5 + 0.01 * k + 0.2 * 0.001 * k))
+    assert record.sleeve == pytest.approx(np.full(99, 1e4)) and record.pore == pytest.approx(1e3 * k)
+
+
+def test_a_damaged_dutch_sounding_is_one_line(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    whole = write_sounding(tmp_path / "whole.gef").read_bytes()
+    refused = 0
+    for number in range(120):
+        content = bytearray(whole)
+        if number % 3 == 0:
+            content = content[: rng.integers(0, len(content))]
+        else:
+            for _ in range(3):
+                content[rng.integers(0, len(GEF))] = rng.integers(32, 127)
+        path = tmp_path / "mutant.gef"
+        path.write_bytes(bytes(content))
+        try:
+            assert np.isfinite(read_force(path, gauge(), 0.0178).pressure).all()
+        except MeasurementError as trouble:
+            refused += 1
+            assert "\n" not in str(trouble)
+    assert refused > 20

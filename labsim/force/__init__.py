@@ -37,6 +37,30 @@ class Columns:
     pore: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
+def correct_for_water(
+    path: Path,
+    key: str,
+    area_ratio: float,
+    depth: FloatArray,
+    tip: FloatArray,
+    sleeve: FloatArray,
+    pore: FloatArray,
+) -> Columns:
+    """A cone sounding with qt = qc + (1 - a) u where pore water was measured. (n,), m and Pa, NaN where there is nothing; key :
+    what the file calls the area ratio. Raises MeasurementError."""
+    measured = bool(np.isfinite(pore).any())
+    if measured and not 0.0 <= area_ratio <= 1.0:
+        raise MeasurementError(
+            path, key, f"is {area_ratio:g}, not an area ratio between 0 and 1; write it into the heading"
+        )
+    if measured:  # a row without u is lost: nobody knows its correction
+        tip = tip + (1.0 - area_ratio) * pore
+    nothing = np.empty(0)
+    return Columns(
+        depth, tip, sleeve if np.isfinite(sleeve).any() else nothing, pore if measured else nothing
+    )
+
+
 @dataclass(frozen=True)
 class ForceRecord:
     """One record inside its window, sorted by depth. depth (m), pressure (Pa) : (n,); lost : rows without a number; lifted : rows
@@ -66,20 +90,23 @@ def read_gauge(table: Table) -> Gauge:
             raise table.wrong("window_mm", f"{window} does not grow; write the shallower depth first")
     units = FORCE_UNITS if forces else PRESSURE_UNITS
     if forces or pressures:
-        unit = units[table.choice("force_unit", tuple(units))]
-    else:  # formats without named columns state their unit
-        unit = units[table.choice("force_unit", tuple(units), "MPa")]
+        name = table.choice("force_unit", tuple(units))
+    else:  # formats without named columns state their unit; this one is that of the errors
+        units = FORCE_UNITS | PRESSURE_UNITS
+        name = table.choice("force_unit", tuple(units), "MPa")
+    unit = units[name]
     top = LARGEST / unit
     return Gauge(
         depth_column=table.text("depth_column", ""),
         column=table.text("force_column", "") or table.text("pressure_column", ""),
-        is_force=forces,
+        is_force=name in FORCE_UNITS,
         depth_unit=DEPTH_UNITS[table.choice("depth_unit", tuple(DEPTH_UNITS), "m")],
         unit=unit,
         sigma=table.number("sigma", 0.0, top, unit=unit),
         offset_sigma=table.number("offset_sigma", 0.0, top, unit=unit, default=0.0),
         scale_sigma=table.number("scale_sigma", 0.0, 0.5, default=0.0),
         window=(0.0, math.inf) if window is None else (window[0] * 1e-3, window[1] * 1e-3),
+        surface=1e-3 * table.number("surface_mm", -1e5, 1e5, default=0.0),
     )
 
 
@@ -106,7 +133,7 @@ def _read(path: Path, gauge: Gauge, radius: float, state: tuple[int, int]) -> Fo
             "record.file",
             f"has {int(good.sum())} rows with depth and force, fewer than {FEWEST}; export them all",
         )
-    depth = found.depth[good]
+    depth = found.depth[good] - gauge.surface
     sinking = depth > np.concatenate([[-math.inf], np.maximum.accumulate(depth)[:-1]])
     inside = sinking & (depth >= gauge.window[0]) & (depth <= gauge.window[1])
     if inside.sum() < FEWEST:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import LabsimError, MeasurementError
-from ..records import FloatArray, Gauge
+from ..records import Gauge
 from ..tracks.lines import read_lines, read_number
-from . import Columns
+from . import Columns, correct_for_water
 
 SUFFIXES = (".cpt",)
 FIELD = re.compile(r"(?:^|,)\s*([A-Za-z%]+)\s*=\s*([^,]*)")
@@ -40,19 +40,7 @@ def read(path: Path, gauge: Gauge, section: float) -> Columns:
             path, "record.file", "has no line with D= and QC=; name a sounding's .cpt file"
         )
     depth, tip, sleeve, pore = np.array(rows).T
-    pressure = tip * 1e6
-    if np.isfinite(pore).any():
-        if not 0.0 <= area_ratio <= 1.0:
-            raise MeasurementError(
-                path, "MA", f"is {area_ratio:g}, not an area ratio between 0 and 1; write it into the heading"
-            )
-        # a row without U is lost: nobody knows its correction
-        pressure = pressure + (1.0 - area_ratio) * pore * 1e3
-    return Columns(depth, pressure, _kept(sleeve), _kept(pore))
-
-
-def _kept(values: FloatArray) -> FloatArray:
-    return values * 1e3 if np.isfinite(values).any() else np.empty(0)
+    return correct_for_water(path, "MA", area_ratio, depth, tip * 1e6, sleeve * 1e3, pore * 1e3)
 
 
 def _read(path: Path, number: int, key: str, fields: dict[str, str]) -> float:

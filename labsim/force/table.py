@@ -16,5 +16,4 @@ def read(path: Path, gauge: Gauge, section: float) -> Columns:
         if not name:
             raise MeasurementError(path, f"record.{key}", "is missing; name the column of the table")
     _, rows = read_named_columns(path, [gauge.depth_column, gauge.column])
-    pressure = rows[:, 1] * gauge.unit
-    return Columns(rows[:, 0] * gauge.depth_unit, pressure / section if gauge.is_force else pressure)
+    return Columns(rows[:, 0] * gauge.depth_unit, rows[:, 1] * gauge.unit / gauge.per_pressure(section))

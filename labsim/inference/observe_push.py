@@ -49,9 +49,8 @@ class ObservedPush:
 
     @property
     def feels_shaft(self) -> bool:
-        """A force is what holds the whole projectile, a pressure the tip's own: a cone's gauge sits behind it."""
         assert self.drop.gauge is not None
-        return self.drop.gauge.is_force
+        return self.drop.gauge.feels_shaft
 
     @property
     def impact_speed(self) -> float:
@@ -73,6 +72,7 @@ def observe_push(drop: Drop, campaign: Campaign) -> ObservedPush:
     assert drop.gauge is not None and drop.record.path is not None
     path, radius = drop.record.path, drop.projectile.tip_radius
     record = read_force(path, drop.gauge, radius)
+    noise = drop.gauge.sigma / drop.gauge.per_pressure(math.pi * radius**2)
     weight = campaign.gravity * campaign.sample.filling_factor * campaign.sample.monomer_density
     net = record.pressure - weight * record.depth
     width = WINDOW * radius
@@ -91,7 +91,7 @@ def observe_push(drop: Drop, campaign: Campaign) -> ObservedPush:
         middle = float(np.median(inside))
         kept.append(n)
         values.append(math.log(middle))
-        errors.append(math.hypot(ROUGH, drop.gauge.sigma / middle / math.sqrt(inside.size)))
+        errors.append(math.hypot(ROUGH, noise / middle / math.sqrt(inside.size)))
     if not kept:
         raise MeasurementError(
             path,

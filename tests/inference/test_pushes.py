@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import labsim.inference.grid as grid_module
 from labsim.calibrated import read_value
 from labsim.campaign import read_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
@@ -17,8 +18,10 @@ from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.grid import INERTIA, hasten, set_nominal_drop, set_push
 from labsim.inference.measure import Measurements, measure
+from labsim.inference.observations.push_model import encode_push
 from labsim.inference.observe_push import ObservedPush, measure_ground
 from labsim.inference.runs import RunStore
+from labsim.sph import simulate
 from labsim.sph.materials import find_law
 
 TILLER = Path(__file__).resolve().parents[2] / "data/campaigns/tiller"
@@ -73,6 +76,20 @@ def test_a_slow_push_is_a_faster_one_with_slower_rates() -> None:
     assert rate / rated["rate_reference"] == pytest.approx(rate * ratio / after["rate_reference"])
     assert rated["rate_eta"] * rate**0.25 == pytest.approx(after["rate_eta"] * (rate * ratio) ** 0.25)
     assert fast.path[0][-1] * ratio == pytest.approx(setting.path[0][-1])
+
+
+def test_inertia_does_not_matter_at_the_speed_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter of ρ v², half the speed, rates as slow as those of the slow push: the same resistance."""
+    campaign = read_campaign(TILLER)
+    slow = set_push(set_nominal_drop(campaign, campaign.drops[0].projectile.simulated, 0.02, 8e4, 4), 0.02)
+    rated = dict(slow.material.constants) | {"rate_log": 0.14}
+    slow = slow.replace(material=slow.material.replace(constants=tuple(rated.items())))
+    found = []
+    for inertia in (INERTIA, INERTIA / 4):
+        monkeypatch.setattr(grid_module, "INERTIA", inertia)
+        found.append(encode_push(simulate(hasten(slow)), whole=False)[0])
+    print(f"ln of the resistance {found[0]:.4f} and {found[1]:.4f}")
+    assert found[0] == pytest.approx(found[1], abs=0.01)
 
 
 def test_slow_pushes_are_stiffer_where_water_gets_out() -> None:

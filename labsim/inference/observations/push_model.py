@@ -104,7 +104,7 @@ class PushModel:
         """(n, 2): nothing in the place of a camera's surface row, then the zero of the gauge at its stated error."""
         gauge, section = self.observed.drop.gauge, np.pi * self.radius**2
         assert gauge is not None
-        offset = gauge.offset_sigma / (section if gauge.is_force else 1.0)
+        offset = gauge.offset_sigma / gauge.per_pressure(section)
         return np.column_stack([np.zeros(self.data.size), offset / np.exp(self.data)])
 
     def share(
