@@ -165,7 +165,9 @@ def diagnose(
 
 
 def write_report(
-    found: Diagnosis | Calibration | SummaryDiagnosis | SummaryCalibration, folder: Path | str
+    found: Diagnosis | Calibration | SummaryDiagnosis | SummaryCalibration,
+    folder: Path | str,
+    formats: Sequence[str] = (),
 ) -> Path:
     """Write what ``labsim diagnose`` or ``labsim calibrate`` writes of a result: report, numbers, posterior and pictures.
 
@@ -175,6 +177,8 @@ def write_report(
         What ``labsim.diagnose`` or ``labsim.calibrate`` returned.
     folder : Path or str
         It is made where it is missing; ``labsim.load`` reads it again.
+    formats : sequence of str, optional
+        Of pictures beside PNG: ``"pdf"``, ``"svg"``.
 
     Returns
     -------
@@ -182,11 +186,15 @@ def write_report(
         The folder. ``report.html`` in it is one file with all pictures (of published figures: of a diagnosis only).
     """
     from .report.outputs import write_result
-    from .results import SAID
+    from .results import SAID, further_formats
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    _, lines = write_result(found, folder)
+    token = further_formats.set(tuple(formats))
+    try:
+        _, lines = write_result(found, folder)
+    finally:
+        further_formats.reset(token)
     (folder / SAID).write_text(lines + "\n", encoding="utf-8")
     return folder
 

@@ -12,7 +12,7 @@ from ..errors import CampaignError, LabsimError
 from ..records import Scan
 from . import options
 from ._many import Item, finish_many, measure_many
-from .options import AsJson, Out, Quiet, finish, make_output_folder, show_progress, write_json
+from .options import AsJson, Out, Pictures, Quiet, finish, make_output_folder, show_progress, write_json
 
 
 def ct(
@@ -51,6 +51,7 @@ def ct(
     ] = 3.0,
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
+    pictures: Pictures = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:

@@ -40,6 +40,7 @@ def demo(
     scheduler: options.Scheduler = None,
     store: options.Store = None,
     seed: options.Seed = 1,
+    pictures: options.Pictures = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:

@@ -16,7 +16,7 @@ import typer
 
 from .. import text_files
 from ..errors import LabsimError
-from ..results import SAID
+from ..results import FORMATS, SAID, further_formats
 from . import _provenance
 
 Out = Annotated[
@@ -34,6 +34,24 @@ Store = Annotated[
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary, only errors.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON on standard output.")]
+
+
+def choose_formats(text: str | None) -> str | None:
+    """What pictures of this command are written as beside PNG. Raises LabsimError."""
+    names = [name.strip().lower().lstrip(".") for name in (text or "").split(",") if name.strip()]
+    for name in names:
+        if name not in (*FORMATS, "png"):
+            raise LabsimError(
+                "", "--format", f"{name!r} is no format of pictures; write {' or '.join(FORMATS)}"
+            )
+    further_formats.set(tuple(dict.fromkeys(name for name in names if name != "png")))
+    return text
+
+
+Pictures = Annotated[
+    str | None,
+    typer.Option("--format", callback=choose_formats, help="Pictures beside PNG: pdf, svg or pdf,svg."),
+]
 
 
 def make_output_folder(out: Path | None, source: Path, command: str) -> Path:

@@ -84,6 +84,7 @@ def simulate(
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
     store: options.Store = None,
+    pictures: options.Pictures = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:

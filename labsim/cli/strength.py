@@ -22,6 +22,7 @@ def strength(
         Path | None,
         typer.Option("--calibration", help="Output of labsim calibrate: its p_m is the dynamic strength."),
     ] = None,
+    pictures: options.Pictures = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:

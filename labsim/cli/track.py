@@ -86,6 +86,7 @@ def track(
     ] = None,
     workers: options.Workers = None,
     scheduler: options.Scheduler = None,
+    pictures: options.Pictures = None,
     quiet: options.Quiet = False,
     as_json: options.AsJson = False,
 ) -> None:

@@ -10,6 +10,8 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from ..results import further_formats
+
 INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
 # filling factor of dust, measured and simulated alike, so that pictures can be compared by eye
 PHI: dict[str, Any] = {"cmap": "viridis", "vmin": 0.12, "vmax": 0.30}
@@ -24,14 +26,18 @@ STYLE: Any = {
     "figure.dpi": 110,
     "savefig.dpi": 150,
     "lines.linewidth": 1.6,
+    "pdf.fonttype": 42,  # letters stay letters, which a journal asks for
+    "svg.fonttype": "none",
+    "svg.hashsalt": "labsim",
 }
+DATE = {"pdf": "CreationDate", "svg": "Date"}
 
 
 @contextmanager
 def new_figure(
     path: Path, width: float = 6.4, height: float = 4.4, layout: str | None = "constrained"
 ) -> Iterator[Figure]:
-    """A figure in labsim's look, written to ``path``.
+    """A figure in labsim's look, written to ``path`` and, beside it, in the further formats that were asked for.
 
     It belongs to no window: what shows pictures in a notebook or on a screen stays as it was.
     """
@@ -39,6 +45,9 @@ def new_figure(
         figure = Figure(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
         yield figure
         figure.savefig(path)
+        for suffix in further_formats.get():
+            # without the date: the same result is the same file
+            figure.savefig(path.with_suffix(f".{suffix}"), metadata={DATE[suffix]: None})
 
 
 def corner_side(count: int) -> float:
