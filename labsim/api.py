@@ -185,8 +185,9 @@ def write_report(
     Path
         The folder. ``report.html`` in it is one file with all pictures (of published figures: of a diagnosis only).
     """
+    from .report.formats import further_formats
     from .report.outputs import write_result
-    from .results import SAID, further_formats
+    from .results import SAID
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

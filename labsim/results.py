@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,8 +28,6 @@ KINDS = {
     "scans.json": ("scans", None, None),
 }
 SAID = "summary.txt"  # what the command said on the terminal
-FORMATS = ("pdf", "svg")  # that a picture may have beside PNG
-further_formats: ContextVar[tuple[str, ...]] = ContextVar("further_formats", default=())
 
 
 @dataclass(frozen=True, repr=False)

@@ -16,7 +16,8 @@ import typer
 
 from .. import text_files
 from ..errors import LabsimError
-from ..results import FORMATS, SAID, further_formats
+from ..report.formats import FORMATS, further_formats
+from ..results import SAID
 from . import _provenance
 
 Out = Annotated[

@@ -17,6 +17,7 @@ from ..inference.blocks import whiten_all
 from ..inference.fitting import Fit, with_probes
 from ..inference.workbench import Workbench
 from .screen import has_runs
+from .shapes import cause
 
 SEEN = 2.0  # standard deviations that a trace has to leave: the score of one effect exceeds that by chance one time in twenty
 HALF = 1.645  # standard deviations, half of an interval of 90 %: what leaves p_m inside its own is not worth a line
@@ -53,11 +54,15 @@ class Combination:
 
 
 def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
-    """Every effect beside those of the fit that moves p_m, unseen, out of its 90 % interval; the widest p_m first."""
+    """Every effect beside those of the fit that moves p_m, unseen, out of its 90 % interval; the widest p_m first. Of one with a
+    shape, the stated shape stands for all."""
     names = [
         name
         for name, effect in bench.effects.items()
-        if effect.amplitudes and name not in fit.hypothesis and effect.kind != "numerics"
+        if effect.amplitudes
+        and name not in fit.hypothesis
+        and effect.kind != "numerics"
+        and cause(name) == name
     ]
     names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
     known = ["ln_p_m", *fit.hypothesis]

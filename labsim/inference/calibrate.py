@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..calibrated import show_parameter
 from ..effects import list_effects
 from ..effects.model import Model
 from ..errors import InferenceError
@@ -155,10 +156,11 @@ def calibrate(
     bench, fit, scatter = allow_scatter(bench, fit)
     doubts = []
     if scatter is not None:
+        label, _, _ = show_parameter(campaign.material.law)
         doubts.append(
-            f"from drop to drop p_m scatters by {100 * scatter.value:.0f} %, more than the {100 * usual[0]:.0f} % of sieved dust "
-            f"(with which p = {usual[1]:.2g}); p_m and its error hold if the samples do differ by as much. A cause that changes "
-            "from drop to drop looks the same: labsim diagnose tells them apart"
+            f"from drop to drop {label} scatters by {100 * scatter.value:.0f} %, more than the {100 * usual[0]:.0f} % of samples "
+            f"that are alike (with which p = {usual[1]:.2g}); {label} and its error hold if the samples do differ by as much. A "
+            "cause that changes from drop to drop looks the same: labsim diagnose tells them apart"
         )
     posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
     p_value = goodness_of_fit(fit)

@@ -77,8 +77,8 @@ def _inspect_push(drop: Drop, campaign: Campaign) -> Found:
     middle, largest = float(np.median(record.pressure)), float(record.pressure.max())
     found = Found(
         drop.name,
-        f"{size}: {record.depth.size} rows from {record.depth[0]:.4g} to {record.depth[-1]:.4g} m, {middle / 1e3:.4g} kPa in the "
-        f"middle, {largest / 1e3:.4g} kPa at most; {seen.windows.size} windows compared",
+        f"{size}: {record.depth.size} rows from {1e3 * record.depth[0]:.1f} to {1e3 * record.depth[-1]:.1f} mm, "
+        f"{middle / 1e3:.4g} kPa in the middle, {largest / 1e3:.4g} kPa at most; {seen.windows.size} windows compared",
         {
             "rows": int(record.depth.size),
             "rows_lost": record.lost,

@@ -9,6 +9,7 @@ from laws import LawStore, write_campaign
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
+from labsim.diagnosis.shapes import lay_out_shapes
 from labsim.diagnosis.untestable import find_combination, list_untestable
 from labsim.effects.priors import Normal
 from labsim.inference.calibrate import prepare
@@ -80,3 +81,13 @@ def test_about_a_cause_that_is_fitted_it_follows_too(opened):
     before = {each.name: each for each in list_untestable(bench, fit)}
     assert set(found) == {"shear_strength", "filling_factor"} < set(before)
     assert found["shear_strength"].trace < 1.1 * before["shear_strength"].trace
+
+
+def test_a_variant_of_a_shape_is_no_cause_of_its_own(tmp_path):
+    campaign = read_campaign(write_campaign(tmp_path / "made"))
+    bench, fit = prepare(campaign, LawStore(tmp_path / "store"), workers=1)
+    lay_out_shapes(bench)
+    screen(bench, fit, np.random.default_rng(1))
+    assert any(name.startswith("strength_rate@") for name in bench.effects)
+    names = [each.name for each in list_untestable(bench, fit)]
+    assert "strength_rate" in names and not any("@" in name for name in names)
