@@ -35,7 +35,7 @@ NOTEBOOKS = {
         3,
         [
             r"verdict: effect",
-            r"strength_rate +0\.9\d",
+            r"strength_rate, alone or beside another: (0\.9\d|1\.00)",
             r"nominal: rms [45]",
             r"with the cause: rms [12]\.",
             r": none, 0\.[5-9]",
