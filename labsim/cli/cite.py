@@ -83,6 +83,7 @@ def list_texts(name: str, summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "smoothed particle hydrodynamics", "Monaghan (1992)"
     if "p_m_Pa" in summary:
         yield "the sampler of the posterior", "Foreman-Mackey et al. (2013)"
+        yield "the moves of its walkers", "ter Braak (2006)"
     if "scatter" in summary:
         yield "scatter between samples, by restricted maximum likelihood", "Patterson & Thompson (1971)"
     if summary.get("verdict") == "effect":

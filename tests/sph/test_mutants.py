@@ -15,7 +15,7 @@ MUTANTS = {
     "bulk modulus": ("trial = k * (", "trial = 1.03 * k * ("),
     "shear modulus": ("shear = shear_to_bulk * k", "shear = 1.03 * shear_to_bulk * k"),
     "four thirds": ("1.0 + 4.0 * third * shear_to_bulk", "1.0 + third * shear_to_bulk"),
-    "shear strength": ("= shear_factor * shear_factor", "= 1.06 * shear_factor * shear_factor"),
+    "shear strength": ("limit2 = shear_factor", "limit2 = 1.06 * shear_factor"),
     "compressive strength": ("= compressive[i], tensile[i]", "= 1.03 * compressive[i], tensile[i]"),
     "tensile strength": ("= compressive[i], tensile[i]", "= compressive[i], 1.03 * tensile[i]"),
 }

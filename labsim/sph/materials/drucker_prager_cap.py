@@ -131,6 +131,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     exchanged, crushing, reference, cap = s.exchanged, s.crushing, own.reference, own.cap
     bulk, shear = constants.bulk_modulus, constants.shear_modulus
     slope, dilatancy, intercept = constants.slope, constants.dilatancy, constants.intercept
+    yield_square = s.yield_square
     per_flow = 1.0 / (3.0 * shear + bulk * slope * dilatancy)
     hoops = 1.0 if axisymmetric else 0.0
     per_dt = 1.0 / dt if dt > 0.0 else 0.0
@@ -158,7 +159,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         p = min(max(dilated, -constants.tension), crush * cap[i])
         limit = max(rub * (intercept + slope * p), 0.0)
         a, c, b = parts.return_radially(a, c, b, limit * limit)
-        s.yield_square[i] = limit * limit
+        if len(constants.rate.on) > 0:
+            yield_square[i] = limit * limit
         reference[i] = rho_new * parts.exponential(-p / bulk)
         pressure[i], sxx[i], szz[i], sxz[i] = p, a, c, b
         sound[i] = math.sqrt((bulk + 4.0 / 3.0 * shear) / rho_new)
@@ -168,3 +170,6 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         )  # of twice the mean stress
         work[i] += dt * power / (rho_old + rho_new)
         exchanged[i] += dt * (p_old + p) * exchange[i] / (rho_old + rho_new)
+    if len(constants.rate.on) == 0:  # apart: one array more and the loop would not be vectorised
+        for i in range(low, high):
+            yield_square[i] = max(intercept + slope * pressure[i], 0.0) ** 2

@@ -166,6 +166,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     bulk, shear = constants.solid_modulus, constants.shear_modulus
     hoops = 1.0 if axisymmetric else 0.0
     per_dt = 1.0 / dt if dt > 0.0 else 0.0
+    yield_square = s.yield_square
+    for i in range(low, high):
+        yield_square[i] = (2.0 * constants.cohesion) ** 2
     for i in range(low, high):
         hoop = hoops * vr[i] / r[i]
         div = lxx[i] + lzz[i] + hoop
@@ -189,7 +192,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         a, c, b = parts.shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
         limit2 = (2.0 * rub * constants.cohesion) ** 2
         a, c, b = parts.return_radially(a, c, b, limit2)
-        s.yield_square[i] = limit2
+        if len(constants.rate.on) > 0:  # one array more and the loop would not be vectorised
+            yield_square[i] = limit2
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * h * h * phi + 4.0 / 3.0 * shear) / rho_new)
         crushing[i] += 0.2 * (max(zero - before, 0.0) / before * per_dt - crushing[i])

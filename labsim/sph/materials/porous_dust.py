@@ -249,7 +249,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
     phi_zero, compressive, tensile, phi_initial = own.zero_stress, own.compressive, own.tensile, s.initial
     sxx, szz, sxz, pressure, sound = s.sxx, s.szz, s.sxz, s.pressure, s.sound
-    work, exchanged, crushing = s.work, s.exchanged, s.crushing
+    work, exchanged, crushing, yield_square = s.work, s.exchanged, s.crushing, s.yield_square
     inverse_step = (TABLE_SIZE - 1) / TABLE_TOP / solid_density
     third = 1.0 / 3.0
     hoops = 1.0 if axisymmetric else 0.0
@@ -267,6 +267,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         compressive[i] = below + part * (above - below)
         below, above = tension_table[cell], tension_table[cell + np.uint64(1)]
         tensile[i] = below + part * (above - below)
+        yield_square[i] = shear_factor * shear_factor * compressive[i] * tensile[i]
     for i in range(low, high):
         hoop = hoops * vr[i] / r[i]
         div = lxx[i] + lzz[i] + hoop
@@ -294,7 +295,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         a, c, b = shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
         limit2 = shear_factor * shear_factor * strength * tension
         a, c, b = return_radially(a, c, b, limit2)
-        s.yield_square[i] = limit2
+        if not plain:  # one array more and the loop would not be vectorised
+            yield_square[i] = limit2
         sxx[i], szz[i], sxz[i] = a, c, b
         total = p
         stiffness = k * phi / x * (1.0 + 4.0 * third * shear_to_bulk)

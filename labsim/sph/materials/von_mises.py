@@ -81,6 +81,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     yield2 = 4.0 * constants.cohesion * constants.cohesion
     third = 1.0 / 3.0
     hoops = 1.0 if axisymmetric else 0.0
+    yield_square = s.yield_square
+    for i in range(low, high):
+        yield_square[i] = yield2
     for i in range(low, high):
         hoop = hoops * vr[i] / r[i]
         div = lxx[i] + lzz[i] + hoop
@@ -96,7 +99,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         if len(constants.rate.on) > 0:
             limit2 *= parts.strengthen(parts.find_shear_rate(exx, ezz, exz), constants.rate) ** 2
         a, c, b = parts.return_radially(a, c, b, limit2)
-        s.yield_square[i] = limit2
+        if len(constants.rate.on) > 0:  # one array more and the loop would not be vectorised
+            yield_square[i] = limit2
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * rho_new / reference[i] + 4.0 * third * shear) / rho_new)
         crushing[i] = 0.0  # nothing is crushed, so nothing is exchanged
