@@ -15,6 +15,7 @@ from labsim.campaign import read_campaign, read_drop
 from labsim.errors import CampaignError, LabsimError, MeasurementError
 from labsim.force import read_force, read_gauge
 from labsim.inference.observe_push import observe_push
+from labsim.inspection.drops import find_air
 from labsim.tables import Table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -251,6 +252,24 @@ def test_a_profile_of_a_snow_micro_pen(tmp_path: Path) -> None:
     )
     assert record.pressure == pytest.approx(250 * 0.0012 / (math.pi * 2.5e-3**2))
     assert given.sigma == 0.01 and not given.feels_shaft
+
+
+@pytest.mark.parametrize("stated", [0.0, 20.0])
+def test_air_before_the_snow_is_seen_unless_it_is_stated(tmp_path: Path, stated: float) -> None:
+    rng = np.random.default_rng(4)
+    counts = np.concatenate([np.zeros(5000), np.full(20_000, 250)]) + rng.integers(-3, 4, 25_000)
+    path = write_profile(tmp_path / "S31M0067.pnt", counts)
+    given = gauge(force_unit="N", sigma=0.004, surface_mm=stated, window_mm=[0.0, 90.0])
+    record = read_force(path, given, 2.5e-3)
+    nothing = find_air(record, 2.5e-3, 0.004 / given.per_pressure(math.pi * 2.5e-3**2))
+    assert nothing == pytest.approx(2e-2 - 1e-3 * stated, abs=1e-5)
+
+
+def test_a_sounding_that_begins_in_the_ground_meets_no_air() -> None:
+    campaign = read_campaign(TILLER)
+    for drop in campaign.drops[:6]:
+        record = read_force(drop.record.path, drop.gauge, drop.projectile.tip_radius)
+        assert find_air(record, drop.projectile.tip_radius, drop.gauge.sigma) == 0.0
 
 
 def test_a_damaged_profile_is_one_line(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..acceleration import find_impact, read_acceleration
 from ..errors import LabsimError
-from ..force import read_force
+from ..force import ForceRecord, read_force
 from ..inference.observe import read_observed_track
 from ..inference.observe_push import observe_push
 from ..inference.surface_rows import doubt_surface_row
@@ -26,6 +26,8 @@ NARROW = 6.0  # container over tip diameter below which walls are felt
 LIFTED_SHARE = 0.02  # of the rows of a push, that are no deeper than one before
 GAP = 5.0  # steps of depth
 FLAT = 5  # rows at one largest value
+AIR = 2.0  # tip radii without resistance that a push may begin with
+SOFT = 0.02  # of the resistance in the middle: less is none
 SAID_HERE = ("left out (frame", "no position")  # warnings of the curve that judge_frames says in other words
 
 
@@ -62,6 +64,21 @@ def inspect_drop(drop: Drop, campaign: Campaign) -> Found:
             f"the container is only {campaign.sample.diameter / 2 / projectile.tip_radius:.2g} tips wide: walls are felt"
         )
     return found
+
+
+def find_air(record: ForceRecord, radius: float, noise: float) -> float:
+    """How far (m) the tip goes before something resists it all along a tip radius; nought where all of the record does, or none.
+
+    Something is more than noise (Pa, of a row) and SOFT of what resists in the middle.
+    """
+    something = record.pressure > max(5.0 * noise, SOFT * float(np.median(record.pressure)))
+    rows = max(int(radius / record.step), 1)
+    held = np.convolve(something, np.ones(rows), "full")[rows - 1 :] >= 0.9 * rows
+    if not held.any():
+        return 0.0
+    first = int(np.argmax(held))
+    first += int(np.argmax(something[first:]))
+    return float(record.depth[first] - record.depth[0])
 
 
 def _inspect_push(drop: Drop, campaign: Campaign) -> Found:
@@ -104,6 +121,13 @@ def _inspect_push(drop: Drop, campaign: Campaign) -> Found:
         found.odd.append(
             f"{int(gaps.sum())} gap{'s' * (gaps.sum() > 1)} in the depth, the largest {steps[at] * 1e3:.3g} mm at "
             f"{record.depth[at]:.4g} m"
+        )
+    nothing = find_air(record, radius, drop.gauge.sigma / drop.gauge.per_pressure(math.pi * radius**2))
+    if nothing > AIR * radius:
+        ends = record.depth[0] + nothing
+        found.odd.append(
+            f"the first {1e3 * nothing:.3g} mm meet nothing: where that is air, write surface_mm = "
+            f"{1e3 * (ends + drop.gauge.surface):.4g}"
         )
     flat = np.sum(record.pressure >= largest * (1.0 - 1e-9))
     if flat > FLAT:
