@@ -169,6 +169,7 @@ class _Stage:
     """Where one stage of the work is, in the words of people."""
 
     def __init__(self, text: str) -> None:
+        text = re.sub(r"@[^ ,]+", "", text)  # a variant of a cause's shape is that cause
         found = re.fullmatch(r"(.*), (\d+) new", text)
         self.name, self.runs = (found[1], int(found[2])) if found else (text, 0)
         self.calls = 0
