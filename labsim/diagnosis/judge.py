@@ -37,6 +37,12 @@ class Verdict:
         return total
 
     @property
+    def of_first(self) -> float:
+        """Probability of the first and of all that hold it beside something else."""
+        first = set(self.probabilities[0][0])
+        return sum(probability for hypothesis, probability in self.probabilities if first <= set(hypothesis))
+
+    @property
     def named(self) -> list[tuple[Hypothesis, float]]:
         """The first and, where it is an effect, what the data hardly tell from it: until NAMED is reached, MOST_NAMED at most."""
         if self.word != "effect":

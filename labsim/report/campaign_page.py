@@ -54,8 +54,9 @@ def write_campaign_page(
         posteriors.append((labels[1], found.posterior_extended))
     gain = summary["gain"]
     quantiles = summary["p_m_Pa"]
-    (first, probability), *others = found.verdict.named
-    nearly = "".join(f"; {say_hypothesis(other)} {say_probability(p)}" for other, p in others)
+    (first, _), *others = found.verdict.named
+    apart = [(other, p) for other, p in others if not set(first) < set(other)]
+    nearly = "".join(f"; {say_hypothesis(other)} {say_probability(p)}" for other, p in apart)
     tiles = [
         ("p_m, nominal", f"{quantiles['nominal']['q50'] / 1e3:.2f} kPa", _between(quantiles["nominal"])),
         (
@@ -66,7 +67,7 @@ def write_campaign_page(
         (
             "most probable",
             say_hypothesis(first),
-            f"probability {say_probability(probability)}{nearly}",
+            f"probability {say_probability(found.verdict.of_first)}{nearly}",
         ),
     ]
     if found.verdict.word == "unknown":
@@ -76,7 +77,7 @@ def write_campaign_page(
         percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
         extended = quantiles["extended"]
         tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))
-        if probability < CERTAIN:
+        if found.verdict.probabilities[0][1] < CERTAIN:
             middle, spread = quantiles["over_causes"]["q50"] / 1e3, _between(quantiles["over_causes"])
             tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
         tiles.append(("gone on held-out drops", percent, "of the removable discrepancy"))

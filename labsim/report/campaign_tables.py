@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -272,18 +273,23 @@ def say_verdict(found: Diagnosis) -> str:
     sure = say_probability(probability)
     if beside:  # the cause is there either way
         partners = " or ".join(
-            f"{say_hypothesis([name for name in h if name not in best])} ({say_probability(p)})"
+            f"{_say_titles(found, [name for name in h if name not in best])} ({say_probability(p)})"
             for h, p in beside
         )
-        sure = f"{say_probability(found.verdict.inclusion[best[0]])}, alone ({sure}) or with {partners}"
+        sure = f"{say_probability(found.verdict.of_first)}, alone ({sure}) or while {partners}"
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
-    if probability < 0.5:
+    if found.verdict.of_first < 0.5:
         lead = "These data do not decide; most probable"
     return (
         f"{lead or 'The simulation is wrong'}: {causes}; probability {sure}{hardly}. With it, {label} "
         f"{moved}, and {say_gain(found.gain, say_records(found.bench))}."
     )
+
+
+def _say_titles(found: Diagnosis, names: Sequence[str]) -> str:
+    titles = [found.bench.effects[name].title if name in found.bench.effects else name for name in names]
+    return " and ".join(f"{title[0].lower()}{title[1:]}" for title in titles)
 
 
 def _say_cause(found: Diagnosis, name: str) -> str:

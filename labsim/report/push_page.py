@@ -144,7 +144,7 @@ def write_push_diagnosis(
     draw_causes(found, folder / "causes.png")
     draw_held_out(found, [label for label, _ in fits], folder / "held_out.png", (100.0, "%"))
     draw_p_m(posteriors, folder / "posterior.png", show_parameter(law))
-    first, probability = found.verdict.named[0]
+    first, _ = found.verdict.named[0]
     gain, label = found.gain, show_parameter(law)[0]
     tiles = [
         (
@@ -157,7 +157,7 @@ def write_push_diagnosis(
             say_p_value(found.p_value),
             "it does not explain the data" if found.p_value < DOUBTFUL else "it explains the data",
         ),
-        ("most probable", say_hypothesis(first), f"probability {say_probability(probability)}"),
+        ("most probable", say_hypothesis(first), f"probability {say_probability(found.verdict.of_first)}"),
     ]
     if found.best is not found.nominal:
         tiles.append(

@@ -51,3 +51,4 @@ def test_a_single_with_less_evidence_never_stands_before_one_with_more(gains, le
 def test_a_cause_is_at_work_alone_or_beside_another():
     verdict = Verdict("effect", [(("rate",), 0.6), (("rate", "gauge"), 0.3), (("none",), 0.1)])
     assert verdict.inclusion == pytest.approx({"rate": 0.9, "gauge": 0.3, "none": 0.1})
+    assert verdict.of_first == pytest.approx(0.9)

@@ -47,6 +47,18 @@ def test_drawn_without_a_word_on_the_console(name, width, scheme, browser, reque
     page.close()
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["none", "effect", "unknown", "calibrated"])
+def test_the_page_can_be_read_by_everybody(name, scheme, browser, request) -> None:  # type: ignore[no-untyped-def]
+    """No violation of WCAG that axe finds: contrast, names, headings, tables, language."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    page, _said, _ = open_page(browser, request.getfixturevalue(name), 1280, scheme)
+    page.wait_for_selector("html[data-figures=drawn]", state="attached", timeout=60_000)
+    found = axe.run(page)
+    assert found.violations_count == 0, found.generate_report()
+    page.close()
+
+
 def test_links_inside_work_by_keyboard(effect, browser) -> None:  # type: ignore[no-untyped-def]
     page, _said, _ = open_page(browser, effect, 1280)
     page.keyboard.press("Tab")

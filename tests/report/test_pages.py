@@ -99,7 +99,7 @@ def test_keyboard_and_text_alternatives(name: str, request: pytest.FixtureReques
         assert len(picture["alt"]) > 20
     for attributes in page.all("div"):
         if "data-figure" in attributes:
-            assert attributes["role"] == "img" and len(attributes["aria-label"]) > 20
+            assert attributes["role"] == "figure" and len(attributes["aria-label"]) > 20
         if "tabindex" in attributes:
             assert attributes["aria-label"]
     assert page.all("html")[0]["lang"] == "en" and len(page.all("h1")) == 1

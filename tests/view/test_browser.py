@@ -47,6 +47,17 @@ def click_picture(page, column: float, row: float) -> None:  # type: ignore[no-u
     page.locator("#picture").click(position={"x": (column + 0.5) * zoom, "y": (row + 0.5) * zoom})
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_can_be_used_by_everybody(drop: Path, browser, scheme: str) -> None:  # type: ignore[no-untyped-def]
+    """No violation of WCAG that axe finds: contrast, names, headings, language."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    with serving(drop) as address:
+        page, _said = open_page(browser, address, 1280, scheme)
+        wait_measured(page, 1)
+        found = axe.run(page)
+        assert found.violations_count == 0, found.generate_report()
+
+
 def test_a_drop_is_corrected_by_clicks(drop: Path, browser) -> None:  # type: ignore[no-untyped-def]
     file = drop / "drop.toml"
     before = file.read_text()
