@@ -276,7 +276,9 @@ def say_verdict(found: Diagnosis) -> str:
             f"{_say_titles(found, [name for name in h if name not in best])} ({say_probability(p)})"
             for h, p in beside
         )
-        sure = f"{say_probability(found.verdict.of_first)}, alone ({sure}) or while {partners}"
+        sure = (
+            f"{say_probability(found.verdict.of_first)}, alone ({sure}) or beside another cause: {partners}"
+        )
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
     if found.verdict.of_first < 0.5:
