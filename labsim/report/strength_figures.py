@@ -9,7 +9,7 @@ import numpy as np
 
 from ..inference.observations.static_tests import StrengthFit
 from ..records import Campaign
-from ..sph.materials.porous_dust import compressive_strength
+from ..sph.sirono import compressive_strength
 from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
 
 LOOKS = {

@@ -11,6 +11,7 @@ import numpy as np
 from ..records import FloatArray
 from . import particles as rows
 from .materials import find_law, solver_hash
+from .materials._parts import gas_energy
 from .reconstruction import differentiate_field, share_above
 from .setting import DropSetting
 
@@ -130,12 +131,7 @@ def make_run(
     stress_work = float(np.sum(mass * at_end[rows.WORK]))
     exchanged = float(np.sum(mass * at_end[rows.EXCHANGED]))
     elastic = float(np.sum(mass * (at_end[rows.ELASTIC] - at_start[rows.ELASTIC])))
-    # only some laws let gas be trapped
-    gas = (
-        float(np.sum(mass * law.gas_energy(setting, rows.name_rows(setting, at_end)[0])))
-        if setting.pore_gas
-        else 0.0
-    )
+    gas = float(np.sum(mass * gas_energy(setting, rows.name_rows(setting, at_end)[0])))
     energies = {
         "kinetic_at_contact": kinetic_0,
         "gravity": setting.gravity * fallen,

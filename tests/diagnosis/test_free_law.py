@@ -26,7 +26,7 @@ from labsim.inference.open_workbench import open_workbench
 from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.sph import DropSetting
-from labsim.sph.materials.porous_dust import tabulate_strengths
+from labsim.sph.sirono import tabulate_strengths
 
 CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")
 RADIUS = 0.5e-3  # m

@@ -23,9 +23,9 @@ from labsim.records import Camera, Material, Projectile
 from labsim.sph import DropSetting, check_setting, simulate
 from labsim.sph.bodies import set_body
 from labsim.sph.materials import find_law
-from labsim.sph.materials.porous_dust import compressive_strength
 from labsim.sph.particles import fill_at_rest, name_rows
 from labsim.sph.profile import volume_below
+from labsim.sph.sirono import compressive_strength
 from labsim.sph.tips import make_profile
 from labsim.tracks import read_rows
 from labsim.video import open_frames

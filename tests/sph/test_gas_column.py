@@ -10,8 +10,8 @@ import pytest
 
 from labsim.records import Material
 from labsim.sph import particles as rows
+from labsim.sph import sirono
 from labsim.sph.bodies import elastic_material, evolve_body, fill_block, set_body
-from labsim.sph.materials import porous_dust as dust
 
 SPACING, COLUMNS, WALL = 1e-4, 8, 3
 
@@ -35,8 +35,8 @@ def test_slow_press(geometry):
     now = result.state[:, middle]
     phi = now[rows.DENSITY] / 2000.0
     trapped = gas * (phi - 0.15) / (1.0 - phi)
-    own = dust.compressive_strength(phi, material)
-    axial = own + 2 / 3 * dust.shear_strength(phi, material) + trapped
+    own = sirono.compressive_strength(phi, material)
+    axial = own + 2 / 3 * sirono.shear_strength(phi, material) + trapped
     print(
         f"{geometry}: φ {phi.min():.4f} to {phi.max():.4f}, gas {trapped.mean() / axial.mean():.0%} of the stress"
     )

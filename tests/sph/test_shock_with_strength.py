@@ -13,10 +13,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from labsim.records import Material
-from labsim.sph import Numerics
+from labsim.sph import Numerics, sirono
 from labsim.sph import particles as rows
 from labsim.sph.bodies import evolve_body, fill_block, set_body
-from labsim.sph.materials import porous_dust as dust
 
 SOLID, START = 2000.0, 0.15
 SPACING, COLUMNS, LAYERS, WALL = 1e-4, 8, 300, 3
@@ -24,14 +23,14 @@ SPACING, COLUMNS, LAYERS, WALL = 1e-4, 8, 300, 3
 
 def solve_shock(material, speed):
     """φ and axial stress (Pa) behind the front, the front's speed (m/s)."""
-    modulus = float(dust.bulk_modulus(START, material))
+    modulus = float(sirono.bulk_modulus(START, material))
     shear = 4 / 3 * material.shear_to_bulk * modulus
 
     def crush(phi):
-        return float(dust.compressive_strength(phi, material))
+        return float(sirono.compressive_strength(phi, material))
 
     def hold(phi):
-        return 2 / 3 * float(dust.shear_strength(phi, material))
+        return 2 / 3 * float(sirono.shear_strength(phi, material))
 
     def stress(phi):
         pressure = min(modulus * (phi / START - 1), crush(phi))

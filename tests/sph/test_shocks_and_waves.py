@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from labsim.records import Material
-from labsim.sph import Numerics
+from labsim.sph import Numerics, sirono
 from labsim.sph import particles as rows
 from labsim.sph.bodies import elastic_material, evolve_body, fill_block, set_body
-from labsim.sph.materials import porous_dust as dust
 from labsim.sph.particles import fill_at_rest
 
 SPACING = 1e-4
@@ -134,11 +133,11 @@ def test_slow_uniaxial_compression(geometry):
     pressure = result.state[rows.PRESSURE][middle]
     axial = pressure - result.state[rows.SZZ][middle]
     print(
-        f"{geometry} φ {phi.min():.4f}..{phi.max():.4f}  p/Σ {np.mean(pressure / dust.compressive_strength(phi, material)):.4f}"
+        f"{geometry} φ {phi.min():.4f}..{phi.max():.4f}  p/Σ {np.mean(pressure / sirono.compressive_strength(phi, material)):.4f}"
     )
     assert phi.mean() > 0.2
-    np.testing.assert_allclose(pressure, dust.compressive_strength(phi, material), rtol=0.01)
-    expected = dust.compressive_strength(phi, material) + 2 / 3 * dust.shear_strength(phi, material)
+    np.testing.assert_allclose(pressure, sirono.compressive_strength(phi, material), rtol=0.01)
+    expected = sirono.compressive_strength(phi, material) + 2 / 3 * sirono.shear_strength(phi, material)
     np.testing.assert_allclose(axial, expected, rtol=0.01)
 
 
@@ -160,9 +159,9 @@ def test_pressed_let_go_and_pressed_again():
     print("φ", np.round(filling, 5), "axial stress", np.round(axial, 2))
     pressed, rest, low, again, end = filling
     zero = float(
-        dust.solve_zero_stress(pressed, dust.compressive_strength(pressed, material), 45e3, 4.0, True)
+        sirono.solve_zero_stress(pressed, sirono.compressive_strength(pressed, material), 45e3, 4.0, True)
     )
-    modulus = float(dust.bulk_modulus(zero, material))
+    modulus = float(sirono.bulk_modulus(zero, material))
 
     def climb(start: float, stop: float) -> float:
         return modulus * ((stop - start) / zero + 2 / 3 * math.log(stop / start))
@@ -170,7 +169,7 @@ def test_pressed_let_go_and_pressed_again():
     assert axial[1] - axial[2] == pytest.approx(climb(low, rest), rel=0.02)
     assert axial[3] - axial[2] == pytest.approx(climb(low, again), rel=0.02)
     for phi, stress in ((pressed, axial[0]), (end, axial[-1])):
-        strength = dust.compressive_strength(phi, material) + 2 / 3 * dust.shear_strength(phi, material)
+        strength = sirono.compressive_strength(phi, material) + 2 / 3 * sirono.shear_strength(phi, material)
         assert stress == pytest.approx(float(strength), rel=0.002)
 
 

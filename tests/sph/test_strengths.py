@@ -8,6 +8,7 @@ import pytest
 
 import labsim
 from labsim.records import Material
+from labsim.sph import sirono
 from labsim.sph.bodies import set_body
 from labsim.sph.materials import porous_dust as dust
 from labsim.sph.particles import fill_at_rest, name_rows
@@ -20,7 +21,7 @@ STRENGTH_OVER_P_M = np.array(
 
 @pytest.mark.parametrize("p_m", [260.0, 1300.0, 13000.0])
 def test_compressive_strength(p_m):
-    strength = dust.compressive_strength(PHI, Material(p_m=p_m))
+    strength = sirono.compressive_strength(PHI, Material(p_m=p_m))
     np.testing.assert_allclose(strength, p_m * STRENGTH_OVER_P_M, rtol=1e-4)
 
 
@@ -29,14 +30,14 @@ def test_compressive_strength_of_unidirectional_compression():
     phi = [0.16, 0.18, 0.20, 0.22, 0.24, 0.26, 0.28, 0.30, 0.32]
     expected = [650.5, 1648, 2709, 3972, 5600, 7895, 11575, 19024, 48211]
     np.testing.assert_allclose(
-        dust.compressive_strength(phi, material), expected, rtol=0, atol=0.5
+        sirono.compressive_strength(phi, material), expected, rtol=0, atol=0.5
     )  # as printed
 
 
 def test_tensile_strength():
     phi = [0.10, 0.15, 0.20, 0.25, 0.30, 0.41, 0.54, 0.58]
     expected = [-887.2, -1052.0, -1247.4, -1479.1, -1753.9, -2551.5, -3973.7, -4554.1]
-    np.testing.assert_allclose(dust.tensile_strength(phi, Material()), expected, rtol=1e-4)
+    np.testing.assert_allclose(sirono.tensile_strength(phi, Material()), expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -45,30 +46,30 @@ def test_tensile_strength():
 )
 def test_shear_strength(p_m, expected):
     phi = [0.15, 0.20, 0.25, 0.30, 0.40]
-    np.testing.assert_allclose(dust.shear_strength(phi, Material(p_m=p_m)), expected, rtol=5e-4)
+    np.testing.assert_allclose(sirono.shear_strength(phi, Material(p_m=p_m)), expected, rtol=5e-4)
 
 
 def test_bulk_modulus_grows_with_the_fourth_power():
-    np.testing.assert_allclose(dust.bulk_modulus([0.15, 0.30], Material()), [45e3, 720e3])
+    np.testing.assert_allclose(sirono.bulk_modulus([0.15, 0.30], Material()), [45e3, 720e3])
 
 
 def test_table_is_the_formula_between_the_edges():
     material = Material()
-    strength, tension = dust.tabulate_strengths(material)
+    strength, tension = sirono.tabulate_strengths(material)
     phi = np.linspace(material.phi_1 + 0.01, material.phi_2 - 0.03, 4001)
-    grid = np.linspace(0.0, dust.TABLE_TOP, dust.TABLE_SIZE)
+    grid = np.linspace(0.0, sirono.TABLE_TOP, sirono.TABLE_SIZE)
     np.testing.assert_allclose(
-        np.interp(phi, grid, strength), dust.compressive_strength(phi, material), rtol=1e-5
+        np.interp(phi, grid, strength), sirono.compressive_strength(phi, material), rtol=1e-5
     )
     np.testing.assert_allclose(
-        np.interp(phi, grid, tension), -dust.tensile_strength(phi, material), rtol=1e-6
+        np.interp(phi, grid, tension), -sirono.tensile_strength(phi, material), rtol=1e-6
     )
 
 
 def test_strength_goes_on_without_a_jump_beyond_its_poles():
     material = Material()
-    low, high = material.phi_1 + dust.EDGE, material.phi_2 - dust.EDGE
-    around = dust.compressive_strength([0.05, low, high - 1e-7, high, high + 1e-7, 0.62], material)
+    low, high = material.phi_1 + sirono.EDGE, material.phi_2 - sirono.EDGE
+    around = sirono.compressive_strength([0.05, low, high - 1e-7, high, high + 1e-7, 0.62], material)
     assert around[0] == around[1] > 0
     assert np.all(np.diff(around[2:]) > 0)
     below, above = np.diff(around[2:5])
@@ -86,9 +87,9 @@ def test_strength_goes_on_without_a_jump_beyond_its_poles():
     ],
 )
 def test_zero_stress_filling_factor(p_m, modulus, phi, expected):
-    pressure = float(dust.compressive_strength(phi, Material(p_m=p_m)))
+    pressure = float(sirono.compressive_strength(phi, Material(p_m=p_m)))
     for fourth in (True, False):  # the power by products, and by the general function
-        zero = dust.solve_zero_stress(phi, pressure, modulus, 4.0, fourth)
+        zero = sirono.solve_zero_stress(phi, pressure, modulus, 4.0, fourth)
         assert zero == pytest.approx(expected, abs=1.01e-5)
         stiffness = modulus * (zero / 0.15) ** 4
         assert stiffness * (phi / zero - 1) == pytest.approx(pressure, rel=1e-9)
@@ -133,7 +134,7 @@ def test_loading_cycle(modulus):
     material = Material(p_m=1300.0, bulk_modulus=modulus)
     lump = OneParticle(material)
     spent = lump.move(0.25, 4000)
-    strength = float(dust.compressive_strength(0.25, material))
+    strength = float(sirono.compressive_strength(0.25, material))
     assert lump.pressure == pytest.approx(strength, rel=1e-5)
     zero = lump.zero[0]
     held = lump.elastic
@@ -147,7 +148,7 @@ def test_loading_cycle(modulus):
     # the loss is what compaction along Σ costs: ∫ Σ dφ / (ρs φ²) less what is held elastically
     phi = np.linspace(0.15, 0.25, 20001)
     elastic_line = modulus * (phi / 0.15 - 1)
-    path = np.minimum(dust.compressive_strength(phi, material), elastic_line) / (2000.0 * phi**2)
+    path = np.minimum(sirono.compressive_strength(phi, material), elastic_line) / (2000.0 * phi**2)
     assert spent == pytest.approx(np.trapezoid(path, phi), rel=1e-3)
     assert spent + given_back > 0.5 * spent
 
@@ -176,7 +177,7 @@ def test_tension_is_limited_and_moves_the_zero_stress_filling_factor():
     material = Material(bulk_modulus=45e3)
     lump = OneParticle(material)
     lump.move(0.13, 1000)
-    assert lump.pressure == pytest.approx(float(dust.tensile_strength(0.13, material)), rel=1e-5)
+    assert lump.pressure == pytest.approx(float(sirono.tensile_strength(0.13, material)), rel=1e-5)
     assert lump.zero[0] < 0.15
 
 
@@ -185,7 +186,7 @@ def test_shear_stops_at_the_shear_strength():
     lump = OneParticle(material)
     lump.move(0.15, 1000, shear=0.1)
     q = np.sqrt(3) * abs(lump.row.sxz[0])
-    assert q == pytest.approx(float(dust.shear_strength(0.15, material)), rel=1e-4)
+    assert q == pytest.approx(float(sirono.shear_strength(0.15, material)), rel=1e-4)
     sheared = OneParticle(material)
     sheared.move(0.15, 1000, shear=1e-3)
     # engineering shear 2·0.001 · 1 s: elastic as long as √3 μ γ < Y
@@ -201,5 +202,5 @@ def test_equation_numbers_are_those_of_the_paper():
     )
     assert len(found) >= 10
     assert set(found) == {"4", "5", "6", "4-6"}
-    assert "eq. 6" in (dust.compressive_strength.__doc__ or "")
-    assert "eq. 5" in (dust.tensile_strength.__doc__ or "")
+    assert "eq. 6" in (sirono.compressive_strength.__doc__ or "")
+    assert "eq. 5" in (sirono.tensile_strength.__doc__ or "")

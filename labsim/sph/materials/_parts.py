@@ -144,7 +144,7 @@ def find_warnings(setting: DropSetting, s: Rows, own: Any) -> list[str]:
     return []
 
 
-def find_shape_energy(s: Rows, shear_modulus: float) -> FloatArray:
+def find_shape_energy(s: Rows, shear_modulus: FloatArray | float) -> FloatArray:
     """Elastic energy of the deviatoric stress per mass, J/kg."""
     squared = s.sxx**2 + s.szz**2 + (s.sxx + s.szz) ** 2 + 2.0 * s.sxz**2
     return np.asarray(squared / (4.0 * shear_modulus * s.density))
@@ -154,6 +154,20 @@ def find_volume_energy(s: Rows, reference: FloatArray, bulk_modulus: FloatArray 
     """Elastic energy per mass, J/kg, of p = bulk_modulus (ρ/reference - 1)."""
     ratio = s.density / reference
     return np.asarray(bulk_modulus / reference * (np.log(ratio) + 1.0 / ratio - 1.0))
+
+
+def gas_energy(setting: DropSetting, s: Rows) -> FloatArray:
+    """Energy held per mass, J/kg, by trapped gas (isothermal) since the pores were as at ``initial`` φ: all of it comes back.
+
+    ∫ P0 ((1 - φi)/(1 - φ) - 1) dφ/(ρs φ²) from φi to φ.
+    """
+    initial, gas_pressure, monomer_density = s.initial, setting.pore_gas, setting.monomer_density
+    phi = s.density / monomer_density
+
+    def primitive(at: FloatArray) -> FloatArray:
+        return (1.0 - initial) * (np.log(at / (1.0 - at)) - 1.0 / at) + 1.0 / at
+
+    return gas_pressure / monomer_density * (primitive(phi) - primitive(initial))
 
 
 @compiled

@@ -124,8 +124,8 @@ def elastic_energy(setting: DropSetting, s: Rows, own: State) -> FloatArray:
     """Per mass, J/kg."""
     law = make_constants(setting)
     h = np.maximum(law.elastic_speed, 1 - law.gain * (own.distension - 1))
-    zero = law.solid_density / own.distension
-    volume = parts.find_volume_energy(s, zero, law.solid_modulus * h**2 / own.distension)
+    stiffness = law.solid_modulus * h**2 / own.distension
+    volume = parts.find_volume_energy(s, law.solid_density / own.distension, stiffness)
     return volume + parts.find_shape_energy(s, law.shear_modulus)
 
 
@@ -151,8 +151,7 @@ def solve_zero_stress(phi, p, before, law):
     y = phi - ratio / (h * h)
     for _ in range(5):
         full = 1.0 - law.gain * (1.0 / y - 1.0)
-        h = max(law.elastic_speed, full)
-        rise = law.gain / (y * y) if full > law.elastic_speed else 0.0
+        h, rise = max(law.elastic_speed, full), law.gain / (y * y) if full > law.elastic_speed else 0.0
         y -= (h * h * (phi - y) - ratio) / (2.0 * h * rise * (phi - y) - h * h)
     return y
 
@@ -162,11 +161,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     """One step of particles low..high-1: velocity gradient in, density, stress, sound and the book of work out."""
     r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
     sxx, szz, sxz, pressure, sound, work = s.sxx, s.szz, s.sxz, s.pressure, s.sound, s.work
-    exchanged, crushing, distension = s.exchanged, s.crushing, own.distension
-    bulk, shear = constants.solid_modulus, constants.shear_modulus
-    hoops = 1.0 if axisymmetric else 0.0
+    exchanged, crushing, yield_square, distension = s.exchanged, s.crushing, s.yield_square, own.distension
+    bulk, shear, hoops = constants.solid_modulus, constants.shear_modulus, 1.0 if axisymmetric else 0.0
     per_dt = 1.0 / dt if dt > 0.0 else 0.0
-    yield_square = s.yield_square
     for i in range(low, high):
         yield_square[i] = (2.0 * constants.cohesion) ** 2
     for i in range(low, high):
@@ -197,8 +194,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         rho[i], pressure[i], sxx[i], szz[i], sxz[i] = rho_new, p, a, c, b
         sound[i] = math.sqrt((bulk * h * h * phi + 4.0 / 3.0 * shear) / rho_new)
         crushing[i] += 0.2 * (max(zero - before, 0.0) / before * per_dt - crushing[i])
-        power = parts.find_power(
-            div, exx, ezz, exz, hoop, p_old + p, sxx_old + a, szz_old + c, sxz_old + b
-        )  # of twice the mean stress
+        p, a, c, b = p_old + p, sxx_old + a, szz_old + c, sxz_old + b  # twice the mean stress
+        power = parts.find_power(div, exx, ezz, exz, hoop, p, a, c, b)
         work[i] += dt * power / (rho_old + rho_new)
-        exchanged[i] += dt * (p_old + p) * exchange[i] / (rho_old + rho_new)
+        exchanged[i] += dt * p * exchange[i] / (rho_old + rho_new)
