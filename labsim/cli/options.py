@@ -7,7 +7,7 @@ import math
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Protocol
@@ -165,10 +165,16 @@ class Progress(Protocol):
     def __call__(self, done: float, total: float, text: str) -> None: ...
 
 
-class _Stage:
-    """Where one stage of the work is, in the words of people."""
+OTHERS = ""  # of the stages: the one that all texts belong to that none of the others begins
+CALIBRATE = ("nominal model", "sampling the posterior")
+DIAGNOSE = ("nominal model", "what each cause changes", OTHERS, "sampling the posterior")
 
-    def __init__(self, text: str) -> None:
+
+class _Stage:
+    """Where one stage of the work is, in the words of people; ``place`` as ``stage 2 of 4, ``."""
+
+    def __init__(self, text: str, place: str = "") -> None:
+        self.place = place
         text = re.sub(r"@[^ ,]+", "", text)  # a variant of a cause's shape is that cause
         found = re.fullmatch(r"(.*), (\d+) new", text)
         self.name, self.runs = (found[1], int(found[2])) if found else (text, 0)
@@ -178,14 +184,34 @@ class _Stage:
     def tell(self, done: float, total: float) -> str:
         """Name of the stage, and the runs that are done of all where it consists of runs."""
         self.calls += 1
+        name = self.place + self.name
         if not self.runs:
-            return self.name
-        return f"{self.name}, {min(self.calls - 1, self.runs) if done < total else self.runs} of {self.runs} runs"
+            return name
+        return f"{name}, {min(self.calls - 1, self.runs) if done < total else self.runs} of {self.runs} runs"
+
+
+class _Places:
+    """Which of the announced stages a text belongs to. What comes back to an earlier one counts as the later: it costs little."""
+
+    def __init__(self, stages: Sequence[str]) -> None:
+        self.stages, self.reached = stages, 0
+
+    def find(self, text: str) -> str:
+        """``stage 2 of 4, ``; nothing where no stages are announced, or the text belongs to none."""
+        begun = [name != OTHERS and text.startswith(name) for name in self.stages]
+        if not any(begun) and OTHERS not in self.stages:
+            return ""
+        number = begun.index(True) if any(begun) else self.stages.index(OTHERS)
+        self.reached = max(self.reached, number)
+        return f"stage {self.reached + 1} of {len(self.stages)}, "
 
 
 @contextmanager
-def show_progress(quiet: bool) -> Iterator[Progress]:
-    """A bar a stage with the time left on a terminal; elsewhere plain lines, one now and then (standard error both)."""
+def show_progress(quiet: bool, stages: Sequence[str] = ()) -> Iterator[Progress]:
+    """A bar a stage with the time left on a terminal; elsewhere plain lines, one now and then (standard error both).
+
+    stages : how the texts of each stage begin, in their order.
+    """
     if quiet:
         yield lambda done, total, text: None
     elif sys.stderr.isatty():
@@ -209,17 +235,18 @@ def show_progress(quiet: bool) -> Iterator[Progress]:
             TimeRemainingColumn(),
         )
         with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-            stages: dict[str, tuple[_Stage, Any]] = {}
+            shown: dict[str, tuple[_Stage, Any]] = {}
+            places = _Places(stages)
 
             def report(done: float, total: float, text: str) -> None:
-                if text not in stages:
-                    stages[text] = (_Stage(text), bars.add_task(text, total=total))
-                stage, task = stages[text]
+                if text not in shown:
+                    shown[text] = (_Stage(text, places.find(text)), bars.add_task(text, total=total))
+                stage, task = shown[text]
                 bars.update(task, completed=done, total=total, description=stage.tell(done, total))
 
             yield report
     else:
-        yield _LineReport()
+        yield _LineReport(stages)
 
 
 class _LineReport:
@@ -227,7 +254,8 @@ class _LineReport:
 
     EVERY = 30.0  # s
 
-    def __init__(self) -> None:
+    def __init__(self, stages: Sequence[str]) -> None:
+        self.places, self.start = _Places(stages), time.monotonic()
         self.text, self.began, self.last, self.first = "", 0.0, 0.0, 0.0
         self.stage = _Stage("")
 
@@ -235,17 +263,21 @@ class _LineReport:
         now = time.monotonic()
         if text != self.text:
             self.text, self.began, self.last, self.first = text, now, -math.inf, done
-            self.stage = _Stage(text)
+            self.stage = _Stage(text, self.places.find(text))
         said = self.stage.tell(done, total)
         ends = done >= total and not self.stage.done
         if self.stage.done or (now - self.last < self.EVERY and not ends):
             return
         self.last, self.stage.done = now, ends
-        left, since = "", done - self.first  # what was done before the first call took an unknown time
+        since = done - self.first  # what was done before the first call took an unknown time
+        parts = [said]
+        if total > 0:
+            parts.append(f"{100 * done / total:.0f} %")
+        if since > 0:
+            parts.append(f"elapsed {say_time(now - self.start)}")
         if since > 0 and done < total:
-            left = f", about {say_time((now - self.began) * (total - done) / since)} left"
-        share = f": {done / total:.0%}" if total > 0 else ""
-        typer.echo(f"{said}{share}{left}", err=True)
+            parts.append(f"about {say_time((now - self.began) * (total - done) / since)} left")
+        typer.echo(", ".join(parts), err=True)
 
 
 def say_time(seconds: float) -> str:

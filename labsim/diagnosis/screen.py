@@ -71,7 +71,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
         if bench.costs_runs(name)
         for amplitude in amplitude_nodes(bench.effects[name], 0.0)
     ]
-    bench.require_changes(wanted, "fingerprints", coarse=True)
+    bench.require_changes(wanted, "what each cause changes", coarse=True)
     names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
     whitened = whiten_all(with_probes(bench, fit, names), ["ln_p_m", *names])
     sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))

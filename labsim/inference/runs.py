@@ -23,6 +23,7 @@ import platformdirs
 
 from ..errors import InferenceError, LabsimError, SimulationError
 from ..sph import DropRun, DropSetting, simulate
+from ..sph._jit import is_compiled
 from ..sph.materials import is_current
 from ..text_files import load_json
 from .run_file import (
@@ -141,6 +142,8 @@ class RunStore:
         if missing:
             cost = {key: estimate_cost(by_key[key]) for key in missing}
             done, total = 0.0, sum(cost.values())
+            if not is_compiled():
+                report(0.0, 0.0, f"{text}, the solver is compiled first, once on a machine")
             text += f", {len(missing)} new"
             report(done, total, text)
             with open_executor(workers, scheduler, len(missing)) as (executor, slots):

@@ -76,3 +76,8 @@ def compiled_loop(function: Callable) -> Callable:
 def loop_folder() -> Path:
     """Where copies of the loop with a law in them lie, beside their compiled code."""
     return Path(numba.config.CACHE_DIR) / "loops"  # type: ignore[attr-defined]
+
+
+def is_compiled() -> bool:
+    """Whether compiled code of this solver lies on disk, so that a process need not wait for it."""
+    return any(Path(numba.config.CACHE_DIR).glob("**/*.nbi"))  # type: ignore[attr-defined]

@@ -168,17 +168,23 @@ def test_progress_in_a_log_tells_runs_done_and_time_left(
 ) -> None:
     clock = iter(np.arange(0.0, 1000.0, 20.0))
     monkeypatch.setattr(options.time, "monotonic", lambda: float(next(clock)))
-    with options.show_progress(quiet=False) as progress:
+    with options.show_progress(quiet=False, stages=options.DIAGNOSE) as progress:
+        progress(0, 0, "nominal model, the solver is compiled first, once on a machine")
         for done in (0, 3, 5, 8, 10):
-            progress(done, 10, "fingerprints, 4 new")
+            progress(done, 10, "what each cause changes, 4 new")
+        progress(1, 1, "pore_gas@0.3")
         for _ in range(3):
             progress(1, 1, "sampling the posterior")
+        progress(1, 1, "a formula")
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
-        "fingerprints, 0 of 4 runs: 0%",
-        "fingerprints, 2 of 4 runs: 50%, about 40 s left",
-        "fingerprints, 4 of 4 runs: 100%",
-        "sampling the posterior: 100%",
+        "stage 1 of 4, nominal model, the solver is compiled first, once on a machine",
+        "stage 2 of 4, what each cause changes, 0 of 4 runs, 0 %",
+        "stage 2 of 4, what each cause changes, 2 of 4 runs, 50 %, elapsed 80 s, about 40 s left",
+        "stage 2 of 4, what each cause changes, 4 of 4 runs, 100 %, elapsed 2 min",
+        "stage 3 of 4, pore_gas, 100 %",
+        "stage 4 of 4, sampling the posterior, 100 %",
+        "stage 4 of 4, a formula, 100 %",
     ]
     assert not any("\x1b" in line for line in lines)
 
@@ -187,7 +193,7 @@ def test_progress_in_a_log_promises_nothing_before_it_knows(capsys: pytest.Captu
     """The first call comes after the first piece of work: how long that took is not known."""
     with options.show_progress(quiet=False) as progress:
         progress(1, 300, "looking for what moves")
-    assert capsys.readouterr().err == "looking for what moves: 0%\n"
+    assert capsys.readouterr().err == "looking for what moves, 0 %\n"
 
 
 def test_progress_is_silent_when_quiet(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -18,6 +19,7 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")],
         cwd=ROOT,
+        env=os.environ | {"LABSIM_SITE_NOTEBOOKS": "false"},  # tests/notebooks runs them
         capture_output=True,
         text=True,
     )
@@ -25,9 +27,24 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert "WARNING" not in done.stderr
     pages = {path.stem for path in (tmp_path / "site").glob("*.html")}
     assert {path.stem for path in (ROOT / "docs").glob("*.md")} <= pages
+    assert {path.stem for path in (ROOT / "notebooks").glob("*.ipynb")} <= {
+        path.stem for path in (tmp_path / "site/notebooks").glob("*.html")
+    }
+    model = (tmp_path / "site/model.html").read_text(encoding="utf-8")
+    assert '<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"' in model
+    assert "arithmatex" not in model
     api = (tmp_path / "site/api.html").read_text(encoding="utf-8")
     for name in ("track", "reduce_scan", "simulate", "calibrate", "diagnose", "tabulate"):
         assert f'id="labsim.api.{name}"' in api
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.stem)
+def test_a_page_is_read_in_one_sitting(page: Path) -> None:
+    """At most 1200 words outside the blocks of code, and no commit outside a table."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    assert len(text.split()) <= 1200
+    prose = "\n".join(line for line in text.splitlines() if not line.startswith("|"))
+    assert not re.search(r"\bcommit [0-9a-f]{7}\b", prose)
 
 
 def test_files_named_in_the_documentation_are_there() -> None:
