@@ -31,8 +31,16 @@ POINTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])  # fractions of the stop that are c
 
 @dataclass(frozen=True)
 class Suggestion:
+    """change : what to do. tells : the causes that it is to tell apart, where it was made for two of them."""
+
     change: str
     information_bits: float
+    tells: tuple[str, str] | None = None
+
+    @property
+    def text(self) -> str:
+        """What to do and what for."""
+        return self.change + (f", to tell {' from '.join(self.tells)}" if self.tells else "")
 
 
 def suggest(
@@ -119,9 +127,9 @@ def _suggest_pushes(
     bits = expected_information(np.array(ratios)[:, None], spread, np.array(weights) / sum(weights))
     return [
         Suggestion(
-            f"{count} more push{'es' * (count > 1)} at {1e3 * slow:g} mm/s and as many at {1e3 * fast:g} mm/s, near each other, "
-            f"to tell {said[0]} from {said[1]}",
+            f"{count} more push{'es' * (count > 1)} at {1e3 * slow:g} mm/s and as many at {1e3 * fast:g} mm/s, near each other",
             round(bits, 3),
+            (said[0], said[1]),
         )
     ]
 

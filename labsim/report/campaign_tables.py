@@ -30,6 +30,7 @@ from .phrases import (
     say_amount,
     say_combination,
     say_hypothesis,
+    say_interval,
     say_probability,
     shown_unit,
     state_p_value,
@@ -222,7 +223,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             ],
         },
         "next_experiment": [
-            {"change": each.change, "information_bits": each.information_bits} for each in suggestions
+            {"change": each.text, "information_bits": each.information_bits} for each in suggestions
         ],
         "numerical_error": state_numerical_error(found.bench),
         "scatter": found.scatter.summarise(),
@@ -289,8 +290,17 @@ def say_verdict(found: Diagnosis) -> str:
     )
 
 
+LISTED_NOWHERE = {
+    "none": "the simulation as it stands explains the data",
+    "unknown": "something that no listed cause explains",
+}
+
+
 def _say_titles(found: Diagnosis, names: Sequence[str]) -> str:
-    titles = [found.bench.effects[name].title if name in found.bench.effects else name for name in names]
+    titles = [
+        found.bench.effects[name].title if name in found.bench.effects else LISTED_NOWHERE[name]
+        for name in names
+    ]
     return " and ".join(f"{title[0].lower()}{title[1:]}" for title in titles)
 
 
@@ -302,7 +312,7 @@ def _say_cause(found: Diagnosis, name: str) -> str:
     parameter = effect.amplitudes[0]
     q = _quantiles(found.posterior_extended, f"{name}.{parameter.name}")
     factor, unit = shown_unit(parameter)
-    middle, low, high = (f"{q[key] * factor:.3g}" for key in ("q50", "q05", "q95"))
+    middle, low, high = say_interval(*(q[key] * factor for key in ("q50", "q05", "q95")))
     amount = f"{parameter.name.replace('_', ' ')} {middle} {unit}".rstrip() + f", 90 %: {low} to {high}"
     # eta s^n says nothing without n; a shape of nought is none
     for shape in (each for each in effect.parameters if each.shape and each.null != 0.0):
@@ -331,8 +341,10 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     lines = [*_say_doubts(found), say_verdict(found), say_remedy(found, suggestions), ""]
     lines.append("  probability  cause")
     worth = [each for each in found.verdict.probabilities if each[1] >= 5e-4][:6]
+    wide = max((len(" + ".join(hypothesis)) for hypothesis, _ in worth), default=0)
     for hypothesis, probability in worth:
-        lines.append(f"  {probability:11.3f}  {' + '.join(hypothesis)}")
+        words = _say_titles(found, hypothesis)
+        lines.append(f"  {probability:11.3f}  {' + '.join(hypothesis):{wide}}  {words}".rstrip())
     if others := found.verdict.probabilities[len(worth) :]:
         lines.append(f"  {sum(p for _, p in others):11.3f}  the {len(others)} others together")
     if found.verdict.word == "effect" and found.verdict.probabilities[0][1] < CERTAIN:
@@ -358,9 +370,7 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     lines += [f"  {text}" for text in say_learned(found)]
     lines += _say_untestable(found)
     if suggestions:
-        lines.append(
-            f"  next experiment: {suggestions[0].change} ({suggestions[0].information_bits:.2f} bits)"
-        )
+        lines.append(f"  next experiment: {suggestions[0].text} ({suggestions[0].information_bits:.2f} bits)")
     lines.append(f"  {found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s")
     return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings[found.doubts :])])
 

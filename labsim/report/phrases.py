@@ -26,6 +26,16 @@ def say_amount(parameter: Parameter, value: float) -> str:
     return f"{value * factor:.3g} {unit}".rstrip()
 
 
+def say_interval(middle: float, low: float, high: float) -> tuple[str, str, str]:
+    """A value and the ends of its interval, with as many digits as the interval's width asks for: at least three, two of the
+    width's own."""
+    largest, width = max(abs(low), abs(middle), abs(high)), high - low
+    digits = 3
+    if width > 0.0 and math.isfinite(width) and largest > 0.0:
+        digits = min(max(3, math.floor(math.log10(largest)) - math.floor(math.log10(width)) + 2), 6)
+    return f"{middle:.{digits}g}", f"{low:.{digits}g}", f"{high:.{digits}g}"
+
+
 def say_hypothesis(hypothesis: Sequence[str]) -> str:
     """Names of effects, and words where there is none."""
     return " + ".join(SAID.get(name, name) for name in hypothesis)
@@ -47,21 +57,21 @@ def say_probability(value: float) -> str:
 
 
 def say_p_value(value: float) -> str:
-    """0.31, 4·10⁻⁹, > 0.99; a dash where there is none."""
+    """0.31, 4·10⁻⁵, > 0.99, < 10⁻⁶ (how far below, no reader needs); a dash where there is none."""
     if not math.isfinite(value):
         return "–"
     if value > 0.99:
         return "> 0.99"
     if value >= 1e-3:
         return f"{value:.2g}"
-    if value <= 0.0:
-        return "< 10⁻³⁰⁰"
+    if value < 1e-6:
+        return "< 10⁻⁶"
     mantissa, exponent = f"{value:.0e}".split("e")
     return f"{mantissa}·10⁻{str(-int(exponent)).translate(SUPERSCRIPT)}"
 
 
 def state_p_value(value: float) -> str:
-    """p = 0.31, p < 10⁻³⁰⁰."""
+    """p = 0.31, p < 10⁻⁶."""
     said = say_p_value(value)
     return f"p {said}" if said[0] in "<>" else f"p = {said}"
 

@@ -34,9 +34,9 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
         return "Look where the nominal fit misses the data, and make the experiment that is proposed next."
     said = []
     if len(found.verdict.named) > 1 and suggestions:
-        names = " from ".join(say_hypothesis(hypothesis) for hypothesis, _ in found.verdict.named[:2])
-        change = suggestions[0].change
-        said.append(change if " to tell " in change else f"first tell {names}: {change}")
+        best = suggestions[0]
+        names = best.tells or [say_hypothesis(hypothesis) for hypothesis, _ in found.verdict.named[:2]]
+        said.append(f"first tell {' from '.join(names)}: {best.change}")
     for name in found.verdict.probabilities[0][0]:
         effect = found.bench.effects[name]
         value = 0.0

@@ -14,7 +14,7 @@ import pytest
 
 from labsim import __version__
 from labsim.report.interactive import SIGNS, SYMBOLS
-from labsim.report.phrases import say_p_value, say_probability
+from labsim.report.phrases import say_interval, say_p_value, say_probability
 from labsim.sph import solver_hash
 
 SECTIONS = "measurement calibration drops causes confusable gain next numerics warnings made".split()
@@ -237,7 +237,7 @@ def test_a_figure_s_data_are_finite(effect: Path) -> None:
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [(0.31, "0.31"), (0.0021, "0.0021"), (3.6e-9, "4·10⁻⁹"), (9.6e-256, "1·10⁻²⁵⁵"), (1.0, "> 0.99"), (0.0, "< 10⁻³⁰⁰"),
+    [(0.31, "0.31"), (0.0021, "0.0021"), (3.6e-5, "4·10⁻⁵"), (9.6e-256, "< 10⁻⁶"), (1.0, "> 0.99"), (0.0, "< 10⁻⁶"),
      (float("nan"), "–")],
 )  # fmt: skip
 def test_p_values_as_people_write_them(value: float, said: str) -> None:
@@ -276,3 +276,16 @@ def test_numbers_stay_with_their_units(effect: Path) -> None:
     source = Page(effect / "report.html").source
     words = source[source.index("<main") : source.index("</main>")]
     assert "\u00a0±\u00a0" in words and " ± " not in words and " µm rms" not in words
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ((1.06014, 1.0562, 1.0641), ("1.0601", "1.0562", "1.0641")),
+        ((0.31, 0.12, 0.52), ("0.31", "0.12", "0.52")),
+        ((0.15, 0.15, 0.15), ("0.15", "0.15", "0.15")),
+        ((-0.2, -0.31, 0.05), ("-0.2", "-0.31", "0.05")),
+    ],
+)
+def test_an_interval_has_the_digits_of_its_width(values, said) -> None:
+    assert say_interval(*values) == said
