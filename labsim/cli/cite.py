@@ -81,7 +81,7 @@ def list_texts(name: str, summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if name == "strength.json":
         return
     yield "smoothed particle hydrodynamics", "Monaghan (1992)"
-    if "p_m_Pa" in summary:
+    if name in ("diagnosis.json", "calibration.json"):
         yield "the sampler of the posterior", "Foreman-Mackey et al. (2013)"
         yield "the moves of its walkers", "ter Braak (2006)"
     if "scatter" in summary:

@@ -64,7 +64,7 @@ def test_entries_are_whole():
 
 def test_a_cause_that_was_found_brings_its_references(tmp_path: Path):
     campaign = DATA / "campaigns/p03"
-    common = {"p_m_Pa": {}, "scatter": {}, "law": None}
+    common = {"scatter": {}, "law": None}
     found = cite(
         write(tmp_path, "diagnosis.json", campaign, verdict="effect", named=[["surface_crust"]], **common)
     )
