@@ -162,6 +162,8 @@ def gas_energy(setting: DropSetting, s: Rows) -> FloatArray:
     ∫ P0 ((1 - φi)/(1 - φ) - 1) dφ/(ρs φ²) from φi to φ.
     """
     initial, gas_pressure, monomer_density = s.initial, setting.pore_gas, setting.monomer_density
+    if gas_pressure == 0.0:
+        return np.zeros_like(initial)
     phi = s.density / monomer_density
 
     def primitive(at: FloatArray) -> FloatArray:
