@@ -46,7 +46,9 @@ def draw_drops(views: Sequence[DropView], path: Path) -> Path:
             band = 2 * view.shown.left_factor * view.allowed
             below.fill_between(clock, -band, band, color=GREY, alpha=0.25, lw=0)
             for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
-                above.plot(clock, depth * view.shown.factor, "-", color=color, lw=1.2, label=name)
+                above.plot(
+                    clock, depth * view.shown.factor, "-", color=color, lw=1.2, label=name.replace("_", " ")
+                )
                 below.plot(clock, view.left(name) * view.shown.left_factor, ".-", color=color, lw=0.9, ms=3)
             above.set_title(
                 f"{view.name}  {2e3 * view.projectile.tip_radius:.3g} mm, {view.speed:.2f} m/s", fontsize=8
@@ -94,7 +96,7 @@ def draw_misfit(views: Sequence[DropView], path: Path) -> Path:
                 bar = 200 * view.allowed_at_stop / deepest
                 ax.errorbar(view.speed, left, bar, fmt=marker, color=color, ms=5, capsize=2, lw=0.8)
         for name, color in zip(views[0].simulated, COLOURS, strict=False):
-            ax.plot([], [], "s", color=color, label=name)
+            ax.plot([], [], "s", color=color, label=name.replace("_", " "))
         for label, marker in dict(
             zip(map(say_projectile, views), projectile_markers(views), strict=True)
         ).items():
@@ -207,7 +209,15 @@ def draw_p_m(
         ax = figure.subplots()
         for (name, posterior), color in zip(posteriors, COLOURS, strict=False):
             values = posterior.calibrated * factor
-            ax.hist(values, bins=60, density=True, histtype="stepfilled", alpha=0.35, color=color, label=name)
+            ax.hist(
+                values,
+                bins=60,
+                density=True,
+                histtype="stepfilled",
+                alpha=0.35,
+                color=color,
+                label=name.replace("_", " "),
+            )
         ax.set_xlabel(P_M if label == "p_m" else f"{label} ({unit})")
         ax.set_ylabel("density")
         ax.set_yticks([])
@@ -250,7 +260,13 @@ def draw_held_out(
         place = np.arange(len(found.held_out_nominal.names))
         width = 0.8 / len(labels)
         for k, (label, rms) in enumerate(zip(labels, sizes, strict=True)):
-            ax.bar(place - 0.4 + width * (k + 0.5), rms * factor, width, color=COLOURS[k], label=label)
+            ax.bar(
+                place - 0.4 + width * (k + 0.5),
+                rms * factor,
+                width,
+                color=COLOURS[k],
+                label=label.replace("_", " "),
+            )
         ax.plot(
             place,
             found.held_out_extended.expected * factor,
