@@ -1,4 +1,4 @@
-"""Depth, stopping time and compacted volume against the spacing, and the convergence figure of docs/numerics.md.
+"""Depth, stopping time and compacted volume against the spacing, and the convergence figure of docs/convergence.md.
 
     python benchmarks/convergence.py                       # a/dx 4 5 6 8 12 16: some four minutes of one core
     python benchmarks/convergence.py 4 5 6 --picture OUT.png

@@ -29,6 +29,9 @@ _PLACES = {
     "calibrate": "api",
     "diagnose": "api",
     "tabulate": "api",
+    "summarise": "api",
+    "plot": "api",
+    "plot_drops": "api",
     "write_report": "api",
     "load": "results",
     "example": "examples",
@@ -41,8 +44,9 @@ _PLACES = {
 }
 
 __all__ = [
-    "Camera", "DropSetting", "LabsimError", "Material", "Projectile", "RunStore", "__version__", "calibrate", "diagnose",
-    "example", "load", "read_campaign", "reduce_scan", "simulate", "tabulate", "track", "write_report",
+    "Camera", "DropSetting", "LabsimError", "Material", "Projectile", "RunStore", "__version__", "calibrate",
+    "diagnose", "example", "load", "plot", "plot_drops", "read_campaign", "reduce_scan", "simulate", "summarise",
+    "tabulate", "track", "write_report",
 ]  # fmt: skip
 
 

@@ -7,11 +7,17 @@ say ``workers=1``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import inspect
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import CampaignError
+import numpy as np
+import numpy.typing as npt
+
+from .errors import CampaignError, MeasurementError
 from .records import Campaign, CompressedVolume, DecelerationCurve, Drop, FloatArray, Measured, Scan, Track
 
 if TYPE_CHECKING:  # pragma: no cover
@@ -23,12 +29,13 @@ if TYPE_CHECKING:  # pragma: no cover
     from .inference.calibrate import Calibration
     from .inference.runs import RunStore
     from .inference.summary import SummaryCalibration
+    from .report.axes import Axes, Figure
     from .sph import DropRun, DropSetting
     from .video.following import Progress
 
 
 def track(
-    source: Path | str | Drop,
+    source: Path | str | Drop | npt.NDArray[Any],
     *,
     frame_rate: float | None = None,
     pixel_size: float | None = None,
@@ -48,7 +55,8 @@ def track(
 ) -> tuple[Track, DecelerationCurve | None]:
     """Follow a projectile, or read a finished track, and fit its motion.
 
-    source : a drop of a campaign, its folder, a video, a folder of pictures, or a track file of any format labsim reads.
+    source : a drop of a campaign, its folder, a video, a folder of pictures, a track file of any format labsim reads, or the
+    pictures as an array (frames, rows, columns) of uint8 or uint16, row 0 at the top.
     frame_rate : Hz. pixel_size and its sigma : m. rod_diameter and its sigma : m, of a rod or bead that gives the scale.
     ruler : picture of one, with ticks every ruler_step (m). surface_row, surface_row_sigma, row_sigma : px, rows grow downwards.
     rotate : degrees, anticlockwise. frames : first and last picture to use. columns : what a table's columns are, as
@@ -61,6 +69,10 @@ def track(
     """
     from .tracking import measure, read_request
 
+    if isinstance(source, np.ndarray):
+        given = {name: value for name, value in locals().items() if name in _OF_TRACK}
+        with _lay_down(source, "frames") as pages:
+            return track(pages, **given)
     tracked = measure(
         read_request(
             source,
@@ -82,16 +94,70 @@ def track(
     return tracked.track, tracked.curve
 
 
-def reduce_scan(source: Path | str | Scan, **settings: Any) -> ReducedScan:
+def reduce_scan(
+    source: Path | str | Scan | npt.NDArray[Any],
+    *,
+    voxel: float | None = None,
+    first_slice: str | None = None,
+    grey_air: float | None = None,
+    grey_per_density: float | None = None,
+    solid_density: float | None = None,
+    bead_radius: float | None = None,
+    bead_mass: float | None = None,
+    **settings: Any,
+) -> ReducedScan:
     """Slices to the axisymmetric map of the filling factor; its ``map`` is a FillingMap.
 
-    source : a scan of a campaign or its folder. settings : as ``labsim.ct.reduce_scan`` takes them (cell, guard …).
-    Raises CampaignError, MeasurementError.
+    Parameters
+    ----------
+    source : Scan, path or array
+        A scan of a campaign, its folder, slices (a folder of images, a TIFF, an HDF5 file), or a volume as an array
+        (slices, rows, columns) of uint8 or uint16.
+    voxel, bead_radius, bead_mass : float, optional
+        m, m, kg; like all that follow they stand over what scan.toml says, and in its place where there is none.
+    first_slice : str, optional
+        "top" or "bottom".
+    grey_air, grey_per_density, solid_density : float, optional
+        Grey level of air, grey levels per kg/m³, density of the grains' own material in kg/m³.
+    settings
+        As ``labsim.ct.reduce_scan`` takes them (cell, guard …).
+
+    Raises
+    ------
+    CampaignError, MeasurementError
     """
     from . import ct
     from .campaign import read_scan
+    from .campaign_scans import NEEDED, complete_stack
 
-    scan = source if isinstance(source, Scan) else read_scan(source)
+    if isinstance(source, np.ndarray):
+        given = {name: value for name, value in locals().items() if name in _OF_SCAN}
+        with _lay_down(source, "slices") as pages:
+            return reduce_scan(pages, **given, **settings)
+    # key of scan.toml -> what was given, as the key has it, and what it is called here
+    keys = {
+        "radius_mm": (bead_radius and bead_radius * 1e3, "bead_radius"),
+        "mass_mg": (bead_mass and bead_mass * 1e6, "bead_mass"),
+        "voxel_um": (voxel and voxel * 1e6, "voxel"),
+        "first_slice": (first_slice, "first_slice"),
+        "grey_air": (grey_air, "grey_air"),
+        "grey_per_density": (grey_per_density, "grey_per_density"),
+        "density_solid_kg_m3": (solid_density, "solid_density"),
+    }
+    stated: dict[str, dict[str, Any]] = {"projectile": {}, "scan": {}, "calibration": {}}
+    for key, (value, _) in keys.items():
+        if value is not None:
+            stated[NEEDED.get(key, "scan")][key] = value
+    if isinstance(source, Scan):
+        if any(stated.values()):
+            raise CampaignError(
+                source.name, "scan", "is read already; give its folder to change what it says"
+            )
+        scan: Any = source
+    else:
+        names = {key: name for key, (_, name) in keys.items()}
+        given = complete_stack(Path(source), stated, names)
+        scan = read_scan(source, given=given, speed_required=False)
     if not isinstance(scan, Scan):
         raise CampaignError(
             source, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
@@ -200,12 +266,100 @@ def write_report(
     return folder
 
 
-def tabulate(thing: Track | DecelerationCurve | CompressedVolume | DropRun) -> pd.DataFrame:
-    """A pandas table, one line a frame, instant or threshold; its columns are those of the CSV files, with units.
+def summarise(found: Any) -> str:
+    """A record or a result in words: of a calibration or a diagnosis what the command prints, of a record its own summary.
 
-    Maps are not tables: ``labsim.ct.make_dataset(reduced)`` gives xarray. Raises TypeError for anything else.
+    Raises TypeError for what is neither.
+    """
+    from .records import Summarised
+
+    if isinstance(found, Summarised):
+        return found.summary()
+    from .report.outputs import say_result
+
+    said = say_result(found)
+    if said is None:
+        raise TypeError(f"{type(found).__name__} is neither a record nor a result of labsim")
+    return said
+
+
+def plot(found: Any, ax: Axes | None = None) -> Axes:
+    """Draw a record or a result on matplotlib axes.
+
+    Parameters
+    ----------
+    found : DecelerationCurve, (Track, DecelerationCurve), DropRun, ReducedScan, Calibration or Diagnosis
+        A curve or a run is drawn as depth (mm) against time (ms), a scan as its map of the filling factor (mm), a calibration or
+        diagnosis as the posterior of p_m (kPa), with the cause where one is found.
+    ax : matplotlib Axes, optional
+        The current axes by default.
+
+    Returns
+    -------
+    matplotlib Axes
+        For titles, limits and further lines.
+
+    Raises
+    ------
+    TypeError
+        Of anything else.
+    """
+    from .ct import ReducedScan
+    from .report import axes
+
+    if isinstance(found, ReducedScan):
+        from .ct import make_dataset
+
+        return axes.plot_filling_factor(make_dataset(found), ax)
+    posterior = getattr(found, "posterior_extended", None) or getattr(found, "posterior", None)
+    if posterior is None and hasattr(found, "calibration"):
+        posterior = found.calibration.posterior
+    if posterior is not None:
+        return axes.plot_density(posterior.samples("p_m_Pa"), "p_m_Pa", ax)
+    table = tabulate(found)
+    if "depth_m" not in table:
+        raise TypeError(f"{type(found).__name__} has no picture of its own; tabulate() gives its numbers")
+    return axes.plot_depth(table, ax)
+
+
+def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
+    """Draw every drop, measured and simulated, and below each what is left.
+
+    Parameters
+    ----------
+    found : Calibration or Diagnosis
+        Of a diagnosis both models are drawn: nominal, and with the cause that was found.
+    figure : matplotlib Figure, optional
+        A new one of pyplot by default, of a size that suits the number of drops.
+
+    Returns
+    -------
+    list of (Axes, Axes)
+        Per drop its motion (mm against ms) and what is left of it (µm) with the band that is allowed for.
+    """
+    from .report.axes import plot_drops as draw
+
+    return draw(found, figure)
+
+
+def tabulate(thing: Any) -> pd.DataFrame:
+    """A pandas table, one line a frame, instant, threshold or draw; its columns are those of the CSV files, with units.
+
+    Parameters
+    ----------
+    thing : Track, DecelerationCurve, CompressedVolume, DropRun, Calibration, Diagnosis, or what ``labsim.track`` returns
+        Of the pair that ``labsim.track`` returns the curve is taken, the track where there is none; of a calibration or diagnosis
+        the draws of its posterior. Maps are not tables: ``labsim.ct.make_dataset(reduced)`` gives xarray.
+
+    Raises
+    ------
+    TypeError
+        Of anything else.
     """
     import pandas as pd
+
+    if isinstance(thing, tuple) and len(thing) == 2:
+        thing = thing[1] if thing[1] is not None else thing[0]
 
     if isinstance(thing, Track):
         from .video import tabulate_track
@@ -225,9 +379,33 @@ def tabulate(thing: Track | DecelerationCurve | CompressedVolume | DropRun) -> p
         )  # planar: per metre of cylinder
         columns: dict[str, FloatArray] = {"time_s": thing.time, "depth_m": thing.depth}
         return pd.DataFrame({**columns, "velocity_m_s": thing.velocity, force: thing.force})
+    posterior = getattr(thing, "posterior_extended", None) or getattr(thing, "posterior", None)
+    if posterior is not None:
+        return pd.DataFrame({name: posterior.samples(name) for name in posterior.names})
     raise TypeError(
-        f"{type(thing).__name__} is no table; give a Track, DecelerationCurve, CompressedVolume or DropRun"
+        f"{type(thing).__name__} is no table; give a track, curve, volume, run, calibration or diagnosis"
     )
+
+
+_OF_TRACK = [name for name in inspect.signature(track).parameters if name != "source"]
+_OF_SCAN = [name for name in inspect.signature(reduce_scan).parameters if name not in ("source", "settings")]
+
+
+@contextmanager
+def _lay_down(pictures: npt.NDArray[Any], what: str) -> Iterator[Path]:
+    """Pictures in memory as pages of a TIFF, for as long as they are read."""
+    import tifffile
+
+    if pictures.ndim != 3 or pictures.dtype not in (np.uint8, np.uint16):
+        raise MeasurementError(
+            what,
+            "array",
+            f"is {pictures.dtype} of shape {pictures.shape}; give uint8 or uint16 as ({what}, rows, columns)",
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{what}.tif"
+        tifffile.imwrite(path, np.ascontiguousarray(pictures), photometric="minisblack")
+        yield path
 
 
 def _read(campaign: Campaign | Path | str) -> Campaign:

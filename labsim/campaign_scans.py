@@ -87,6 +87,39 @@ def read_sample_alone(folder: Path | str) -> Sample:
     return read_sample(Document(Path(folder) / "campaign.toml").table("sample"))
 
 
+NEEDED = {  # of a reduction: key -> table of scan.toml
+    "voxel_um": "scan",
+    "grey_air": "calibration",
+    "grey_per_density": "calibration",
+    "density_solid_kg_m3": "calibration",
+    "radius_mm": "projectile",
+    "mass_mg": "projectile",
+}
+
+
+def complete_stack(
+    scan: Path, stated: Mapping[str, Mapping[str, Any]], names: Mapping[str, str]
+) -> dict[str, dict[str, Any]]:
+    """What was given for slices without scan.toml, with what the files themselves say; a folder with one is left as it is.
+
+    names : of the keys of NEEDED, as the caller gives them. Raises CampaignError, which names all that is missing at once.
+    """
+    found = {name: dict(values) for name, values in stated.items()}
+    if not is_stack(scan):
+        return found
+    missing = [names[key] for key, table in NEEDED.items() if key not in found.get(table, {})]
+    if missing:
+        raise CampaignError(
+            scan, "scan.toml", f"is missing; write it beside the slices, or give {', '.join(missing)}"
+        )
+    from .ct import open_stack  # heavy, and only slices need it
+
+    depth = 8 * open_stack(scan).dtype.itemsize
+    found["scan"] = {"first_slice": "top", "bits": depth if depth in (8, 16) else 16, **found["scan"]}
+    found["projectile"]["shape"] = "sphere"
+    return found
+
+
 def is_stack(path: Path) -> bool:
     """Whether a path is slices themselves: a folder without scan.toml, or a file that is no TOML."""
     return (path.is_dir() and not (path / "scan.toml").is_file()) or (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .errors import CampaignError
+from .text_files import load_json
 
 
 def example(name: str = "p06") -> Path:
@@ -13,7 +14,7 @@ def example(name: str = "p06") -> Path:
     Parameters
     ----------
     name : str
-        As ``list_examples`` has it.
+        As ``list_examples`` has it; or a word of the cause that is hidden in one, as "crust", "pixel" or "none".
 
     Returns
     -------
@@ -27,10 +28,31 @@ def example(name: str = "p06") -> Path:
     """
     found = list_examples()
     if name not in found:
-        raise CampaignError(
-            "labsim.example", name, f"ships not with labsim; choose one of {', '.join(found)}"
-        )
+        hidden = list_hidden(found)
+        alike = [each for each, cause in hidden.items() if name and name in [*cause.split("_"), cause]]
+        if len(alike) != 1:
+            known = [
+                f"{each} ({hidden[each].replace('_', ' ')})" if each in hidden else each for each in found
+            ]
+            raise CampaignError(
+                "labsim.example", name, f"ships not with labsim; choose one of {', '.join(known)}"
+            )
+        name = alike[0]
     return found[name]
+
+
+def list_hidden(found: dict[str, Path]) -> dict[str, str]:
+    """What is hidden in those that were made by a simulator, by name."""
+    file = next(
+        (
+            folder.parent / "truth.json"
+            for folder in found.values()
+            if (folder.parent / "truth.json").is_file()
+        ),
+        None,
+    )
+    truths = load_json(file, CampaignError, "install labsim again") if file is not None else {}
+    return {name: str(truths[name]["cause"]) for name in found if name in truths}
 
 
 def list_examples() -> dict[str, Path]:

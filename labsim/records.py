@@ -6,6 +6,9 @@ physics is done in ``sph``. A record only holds what was stated or measured.
 
 from __future__ import annotations
 
+import collections
+import html
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -18,6 +21,20 @@ FloatArray = npt.NDArray[np.floating[Any]]
 STANDARD_GRAVITY = (
     9.81  # m/s^2, of every free fall, and of the nominal model where a campaign says nothing else
 )
+
+
+class Summarised:
+    """What a record is in a few lines: so it shows itself in a shell and in a notebook, however many numbers it holds."""
+
+    def summary(self) -> str:
+        """The record in a few lines, the first of which says what it is."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.summary().splitlines()[0]}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(self.summary())}</pre>"
 
 
 @dataclass(frozen=True)
@@ -267,8 +284,8 @@ class StrengthTest:
     source: dict = field(default_factory=dict)  # strength.toml [source] as written
 
 
-@dataclass(frozen=True)
-class Campaign:
+@dataclass(frozen=True, repr=False)
+class Campaign(Summarised):
     """One series of drops into one kind of sample, as read from its folder (campaign.read_campaign)."""
 
     folder: Path
@@ -292,9 +309,17 @@ class Campaign:
         """Whether a drop was recorded; of the others only published figures are known."""
         return any(drop.record.kind != "summary" for drop in self.drops)
 
+    def summary(self) -> str:
+        """Its name, and how much of what is in it."""
+        kinds = collections.Counter(drop.record.kind for drop in self.drops)
+        held = [f"{count} drops ({kind})" for kind, count in kinds.items()]
+        held += [f"{len(self.scans)} CT scans"] * bool(self.scans)
+        held += [f"{len(self.strength_tests)} static tests"] * bool(self.strength_tests)
+        return f"{self.name}, {', '.join(held)}\n{self.description}".rstrip()
 
-@dataclass(frozen=True)
-class Track:
+
+@dataclass(frozen=True, repr=False)
+class Track(Summarised):
     """Rows of the projectile's tip, one entry per trusted or rejected frame.
 
     frame : (n,) int; time : (n,) s; tip_row, sigma : (n,) px; valid : (n,) bool; reason : (n,) str, "" where valid.
@@ -308,9 +333,16 @@ class Track:
     reason: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
+    def summary(self) -> str:
+        """How many frames, how good, and the warnings."""
+        rejected = int(np.sum(~self.valid))
+        sigma = float(np.median(self.sigma[self.valid])) if self.valid.any() else math.nan
+        first = f"{self.frame.size} frames, {rejected} rejected, rows to {sigma:.3f} px"
+        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
-@dataclass(frozen=True)
-class DecelerationCurve:
+
+@dataclass(frozen=True, repr=False)
+class DecelerationCurve(Summarised):
     """Motion of the tip below the undisturbed surface; arrays of shape (n,), time zero at contact.
 
     depth, depth_sigma : m; velocity, velocity_sigma : m/s (downwards positive);
@@ -340,9 +372,18 @@ class DecelerationCurve:
     # s, (m,) times of the track's frames as the fit took them: not the track's where frames were lost silently
     clock: FloatArray | None = None
 
+    def summary(self) -> str:
+        """Speed, depth and stopping time, and the warnings."""
+        depth, speed, stop = self.penetration_depth, self.impact_speed, self.stopping_time
+        first = (
+            f"{depth.value * 1e3:.4g} ± {depth.sigma * 1e3:.2g} mm deep from {speed.value:.4g} ± {speed.sigma:.2g} m/s in "
+            f"{stop.value * 1e3:.4g} ± {stop.sigma * 1e3:.2g} ms"
+        )
+        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
-@dataclass(frozen=True)
-class FillingMap:
+
+@dataclass(frozen=True, repr=False)
+class FillingMap(Summarised):
     """Azimuthal mean of the filling factor about the axis of penetration.
 
     r : (nr,) m, cell centres; z : (nz,) m, cell centres, 0 at the undisturbed surface, negative below;
@@ -359,9 +400,18 @@ class FillingMap:
     axis_px: tuple[float, float]
     warnings: tuple[str, ...] = ()
 
+    def summary(self) -> str:
+        """Size, the tip's depth, the filling factors that occur, and the warnings."""
+        low, high = np.nanquantile(self.filling_factor, [0.01, 0.99])
+        first = (
+            f"{self.z.size} x {self.r.size} cells to {self.r[-1] * 1e3:.3g} mm from the axis, tip {self.tip_depth * 1e3:.3g} mm "
+            f"deep, filling factor {low:.2g} to {high:.2g}"
+        )
+        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
-@dataclass(frozen=True)
-class CompressedVolume:
+
+@dataclass(frozen=True, repr=False)
+class CompressedVolume(Summarised):
     """Volume compacted beyond a filling factor; arrays of shape (n,).
 
     filling_factor : thresholds; volume, sigma : m^3 of dust with a larger filling factor.
@@ -371,6 +421,15 @@ class CompressedVolume:
     volume: FloatArray
     sigma: FloatArray
     sphere_volume: float  # m^3, of the projectile's tip sphere
+
+    def summary(self) -> str:
+        """The volume that is denser than the threshold in the middle of those it has."""
+        k = self.filling_factor.size // 2
+        volume, sigma = self.volume[k], self.sigma[k]
+        return (
+            f"denser than {self.filling_factor[k]:.3g}: {volume * 1e9:.3g} ± {sigma * 1e9:.2g} mm³, "
+            f"{volume / self.sphere_volume:.2g} sphere volumes"
+        )
 
 
 __all__ = [

@@ -6,17 +6,19 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
 import labsim
-from labsim.ct import compress, make_dataset, write_compressed, write_map
+from labsim.ct import compress, make_dataset, open_stack, write_compressed, write_map
 from labsim.errors import CampaignError, MeasurementError
-from labsim.video import write_curve, write_track
+from labsim.video import open_frames, write_curve, write_track
 
 DATA = Path(__file__).parents[1] / "data"
+VIDEO = DATA / "video/rendered_drops/mjpeg/video.avi"
 
 
 def test_import_is_quick_and_light() -> None:
@@ -135,3 +137,53 @@ def test_the_example_of_the_package_runs_on_the_campaign_that_ships(
 def test_tabulate_says_what_it_takes() -> None:
     with pytest.raises(TypeError, match="int is no table"):
         labsim.tabulate(3)
+
+
+def test_records_show_themselves_in_a_line_and_in_a_notebook() -> None:
+    track, curve = labsim.track(VIDEO, frame_rate=1e4, pixel_size=20e-6)
+    campaign = labsim.read_campaign(labsim.example("crust"))
+    scan = labsim.reduce_scan(campaign.scans[0])
+    for record, word in (
+        (track, "85 frames"),
+        (curve, "mm deep"),
+        (campaign, "2 CT scans"),
+        (scan, "cells"),
+        (scan.map, "cells"),
+    ):
+        assert word in repr(record) and len(repr(record)) < 250
+        assert record._repr_html_().startswith("<pre>") and labsim.summarise(record) == record.summary()
+    with pytest.raises(TypeError, match="int is neither"):
+        labsim.summarise(3)
+
+
+def test_pictures_in_memory_are_measured_like_those_on_disk() -> None:
+    pictures = np.array(list(open_frames(VIDEO)))
+    same, other = (labsim.track(each, frame_rate=1e4, pixel_size=20e-6)[0] for each in (pictures, VIDEO))
+    assert (
+        np.abs(same.tip_row - other.tip_row).max() < 0.05
+    )  # one knows that its codec is lossy, the other does not
+    scan = labsim.read_campaign(labsim.example("crust")).scans[0]
+    volume = np.array(list(open_stack(scan.slices)))
+    grey = scan.calibration
+    stated = {
+        "voxel": scan.voxel, "grey_air": grey.grey_air, "grey_per_density": grey.grey_per_density,
+        "solid_density": grey.density_solid, "bead_radius": scan.projectile.tip_radius, "bead_mass": scan.projectile.mass,
+    }  # fmt: skip
+    np.testing.assert_array_equal(
+        labsim.reduce_scan(volume, **stated).map.filling_factor, labsim.reduce_scan(scan).map.filling_factor
+    )
+    with pytest.raises(labsim.LabsimError, match="float64"):
+        labsim.track(pictures.astype(float))
+    with pytest.raises(labsim.LabsimError, match=r"give voxel, grey_air.*bead_mass"):
+        labsim.reduce_scan(volume)
+
+
+def test_pictures_of_records_are_matplotlib_axes() -> None:
+    tracked = labsim.track(VIDEO, frame_rate=1e4, pixel_size=20e-6)
+    figure, (left, right) = plt.subplots(1, 2)
+    assert labsim.plot(tracked, left) is left and "depth (mm)" in left.get_ylabel()
+    assert labsim.plot(labsim.reduce_scan(labsim.example("crust") / "ct/C01"), right) is right
+    assert "axis (mm)" in right.get_xlabel()
+    plt.close(figure)
+    with pytest.raises(TypeError, match="Track has no picture"):
+        labsim.plot(tracked[0])

@@ -10,8 +10,8 @@ import labsim
 ROOT = Path(labsim.__file__).parent
 FLOORS = [
     {"records", "errors", "__init__"},
-    {"text_files", "extensions", "references", "examples"},
-    {"tables", "tiff_pages", "tracks"},
+    {"text_files", "extensions", "references"},
+    {"tables", "tiff_pages", "tracks", "examples"},
     {"video", "ct", "sph"},  # siblings that never import each other
     {"own_keys", "calibrated"},
     {"campaign_tables", "repeated_records", "acceleration", "force"},

@@ -91,7 +91,8 @@ def test_a_folder_without_a_result_is_refused(tmp_path: Path):
 def test_examples_ship():
     for name in ("p01", "p03", "p06", "guettler2009"):
         assert labsim.read_campaign(labsim.example(name)).drops
-    with pytest.raises(labsim.LabsimError, match=r"choose one of .*guettler2009"):
+    assert labsim.example("crust").name == "p04" and labsim.example("pixel_scale").name == "p06"
+    with pytest.raises(labsim.LabsimError, match=r"choose one of .*crust.*guettler2009"):
         labsim.example("p99")
 
 

@@ -14,6 +14,15 @@ from . import options
 from ._many import Item, finish_many, measure_many
 from .options import AsJson, Out, Pictures, Quiet, finish, make_output_folder, show_progress, write_json
 
+OPTIONS = {  # of what slices without scan.toml need
+    "voxel_um": "--voxel-um",
+    "grey_air": "--grey-air",
+    "grey_per_density": "--grey-per-density",
+    "density_solid_kg_m3": "--density-solid",
+    "radius_mm": "--bead-radius-mm",
+    "mass_mg": "--bead-mass-mg",
+}
+
 
 def ct(
     scan: Annotated[
@@ -59,7 +68,7 @@ def ct(
 
     What scan.toml would say can be given as options: all of it for slices without one, or single values that stand over it.
     """
-    from ..campaign_scans import read_sample_alone, read_scan, read_scans
+    from ..campaign_scans import complete_stack, read_sample_alone, read_scan, read_scans
 
     tables: dict[str, dict[str, Any]] = {
         "projectile": {"radius_mm": bead_radius_mm, "mass_mg": bead_mass_mg},
@@ -97,7 +106,7 @@ def ct(
             )
         finish_many(found, target / "scans.json", _describe_shortly, as_json=as_json, quiet=quiet)
         return
-    record = read_scan(scan, given=_complete(scan, stated), speed_required=False)
+    record = read_scan(scan, given=complete_stack(scan, stated, OPTIONS), speed_required=False)
     if not isinstance(record, Scan):
         raise CampaignError(
             scan, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
@@ -117,33 +126,6 @@ def ct(
         quiet=quiet,
         folder=target,
     )
-
-
-def _complete(scan: Path, stated: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """The options of slices without scan.toml, with what the files themselves say; all that is missing is named at once."""
-    from ..campaign_scans import is_stack
-
-    if not is_stack(scan):
-        return stated
-    needed = {
-        "--voxel-um": ("scan", "voxel_um"),
-        "--grey-air": ("calibration", "grey_air"),
-        "--grey-per-density": ("calibration", "grey_per_density"),
-        "--density-solid": ("calibration", "density_solid_kg_m3"),
-        "--bead-radius-mm": ("projectile", "radius_mm"),
-        "--bead-mass-mg": ("projectile", "mass_mg"),
-    }
-    missing = [option for option, (table, key) in needed.items() if key not in stated[table]]
-    if missing:
-        raise CampaignError(
-            scan, "scan.toml", f"is missing; write it beside the slices, or give {', '.join(missing)}"
-        )
-    from ..ct import open_stack
-
-    depth = 8 * open_stack(scan).dtype.itemsize
-    stated["scan"] = {"first_slice": "top", "bits": depth if depth in (8, 16) else 16, **stated["scan"]}
-    stated["projectile"]["shape"] = "sphere"
-    return stated
 
 
 def reduce_one(

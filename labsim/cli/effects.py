@@ -20,7 +20,7 @@ from . import options
 WIDE = 130  # columns that the table needs; a list below that, and into files
 KEY = (
     "Priors: a ± b normal, |0 ± b| its upper half, a ×/÷ b log-normal, a to b uniform; each with its reason in --json. "
-    "Add your own as CAMPAIGN/effects/NAME.py (docs/effects.md)."
+    "Add your own as CAMPAIGN/effects/NAME.py (docs/effects-writing.md)."
 )
 
 LEARNED = '''"""{term.title}, learned by labsim diagnose ({out}).

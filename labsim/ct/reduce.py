@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import MeasurementError
-from ..records import FillingMap, FloatArray, Measured, Scan
+from ..records import FillingMap, FloatArray, Measured, Scan, Summarised
 from .artefacts import Cupping, fit_cupping, measure_rings, remove_cupping, remove_rings
 from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
 from .bead import Bead, find_bead
@@ -32,8 +32,8 @@ AXIS_APART = 1.0  # voxels between a stated axis and the bead's middle, beyond w
 RINGS_SEEN = 0.3  # share of the slices that must show rings before any are taken out
 
 
-@dataclass(frozen=True)
-class ReducedScan:
+@dataclass(frozen=True, repr=False)
+class ReducedScan(Summarised):
     """Everything ``reduce_scan`` found.
 
     map.sigma is random error and what the picture shows beyond it (``systematic``); the calibration's scale error is common to
@@ -57,6 +57,11 @@ class ReducedScan:
     ring_rms: float
     masked: np.ndarray  # (nz, nr) True where a cell touches the bead's guard
     facts: dict = field(default_factory=dict)
+
+    def summary(self) -> str:
+        """The map, the undisturbed dust, and what is known about the picture."""
+        still = f"undisturbed filling factor {self.undisturbed.value:.4g} ± {self.undisturbed.sigma:.1g}"
+        return f"{self.scan.name}, {self.map.summary()}\n{still}, voxel noise {self.voxel_noise:.2g}"
 
     @property
     def usable(self) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What an effect is: the records that its file is made of and is called with.
 
-An effect is a file with module-level names (docs/effects.md has them in a table): title, kind, parameters, leaves,
+An effect is a file with module-level names (docs/effects-writing.md has them in a table): title, kind, parameters, leaves,
 references, expect, says, needs, remedy, applies(campaign) and at least one of change_setting(setting, values, place) and
 change_instrument(instrument, values, place). Every effect is a nested extension of the nominal model: at the null of its
 parameters it changes nothing, bit for bit.

@@ -7,9 +7,14 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from ..diagnosis.campaign import Diagnosis
+from ..inference.calibrate import Calibration
 from ..records import FloatArray
+from .campaign_figures import lay_drops, size_drops
+from .drop_views import view_drops
 from .look import BLUE, GREY, INK, PHI
 
 
@@ -64,3 +69,15 @@ def plot_density(draws: FloatArray, name: str, ax: Axes | None = None) -> Axes:
         xlabel=f"{shown} (kPa)" if pressure else shown, ylabel="posterior density; dashed: 90 %", yticks=[]
     )
     return ax
+
+
+def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
+    """Every drop measured and simulated, and below it what is left; of a diagnosis both models. Two axes a drop."""
+    if isinstance(found, Diagnosis):
+        fits = [("nominal", found.nominal)]
+        if found.best is not found.nominal:
+            fits.append((" + ".join(found.best.hypothesis), found.best))
+    else:
+        fits = [(" + ".join(found.fit.hypothesis) or "calibrated", found.fit)]
+    views = view_drops(found.bench, fits)
+    return lay_drops(views, plt.figure(figsize=size_drops(views)) if figure is None else figure)

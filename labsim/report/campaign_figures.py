@@ -32,38 +32,51 @@ LEFT, BELOW, ABOVE = 0.62, 0.5, 0.25  # inches, margins of pictures of many pane
 
 def draw_drops(views: Sequence[DropView], path: Path) -> Path:
     """Depth against time of every drop with each fit, and below it what is left, in µm, with its band."""
+    with new_figure(path, *size_drops(views), layout=None) as figure:
+        lay_drops(views, figure)
+    return path
+
+
+def size_drops(views: Sequence[DropView]) -> tuple[float, float]:
+    """Inches across and down of the picture of all drops."""
+    columns = min(4, len(views))
+    return max(PANEL[0] * columns, 5.0), PANEL[1] * math.ceil(len(views) / columns)
+
+
+def lay_drops(views: Sequence[DropView], figure: Figure) -> list[tuple[Axes, Axes]]:
+    """The panels of ``draw_drops`` on a figure; per drop the axes of the motion and of what is left."""
     columns = min(4, len(views))
     lines = math.ceil(len(views) / columns)
-    width, height = max(PANEL[0] * columns, 5.0), PANEL[1] * lines
-    with new_figure(path, width, height, layout=None) as figure:
-        grid = _divide(figure, lines, columns, right=0.12, wspace=0.22, hspace=0.28)
-        for k, view in enumerate(views):
-            cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
-            above, below = np.ravel(np.asarray(cell.subplots()))
-            clock = view.clock * 1e3
-            above.plot(clock, view.measured * view.shown.factor, ".", color=INK, ms=4, label="measured")
-            below.axhline(0.0, color=INK, lw=0.6)
-            band = 2 * view.shown.left_factor * view.allowed
-            below.fill_between(clock, -band, band, color=GREY, alpha=0.25, lw=0)
-            for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
-                above.plot(
-                    clock, depth * view.shown.factor, "-", color=color, lw=1.2, label=name.replace("_", " ")
-                )
-                below.plot(clock, view.left(name) * view.shown.left_factor, ".-", color=color, lw=0.9, ms=3)
-            above.set_title(
-                f"{view.name}  {2e3 * view.projectile.tip_radius:.3g} mm, {view.speed:.2f} m/s", fontsize=8
+    drawn = []
+    grid = _divide(figure, lines, columns, right=0.12, wspace=0.22, hspace=0.28)
+    for k, view in enumerate(views):
+        cell = grid[k // columns, k % columns].subgridspec(2, 1, height_ratios=[2, 1], hspace=0.12)
+        above, below = np.ravel(np.asarray(cell.subplots()))
+        clock = view.clock * 1e3
+        above.plot(clock, view.measured * view.shown.factor, ".", color=INK, ms=4, label="measured")
+        below.axhline(0.0, color=INK, lw=0.6)
+        band = 2 * view.shown.left_factor * view.allowed
+        below.fill_between(clock, -band, band, color=GREY, alpha=0.25, lw=0)
+        for (name, depth), color in zip(view.simulated.items(), COLOURS, strict=False):
+            above.plot(
+                clock, depth * view.shown.factor, "-", color=color, lw=1.2, label=name.replace("_", " ")
             )
-            if view.shown.downwards:
-                above.invert_yaxis()
-            above.tick_params(labelbottom=False, labelsize=7)
-            below.tick_params(labelsize=7)
-            if k % columns == 0 or view.shown is not views[k - 1].shown:
-                above.set_ylabel(view.shown.label, fontsize=8)
-                below.set_ylabel(view.shown.left_label, fontsize=8)
-            below.set_xlabel("time since contact (ms)", fontsize=8)
-            if k == 0:
-                above.legend(fontsize=7)
-    return path
+            below.plot(clock, view.left(name) * view.shown.left_factor, ".-", color=color, lw=0.9, ms=3)
+        above.set_title(
+            f"{view.name}  {2e3 * view.projectile.tip_radius:.3g} mm, {view.speed:.2f} m/s", fontsize=8
+        )
+        if view.shown.downwards:
+            above.invert_yaxis()
+        above.tick_params(labelbottom=False, labelsize=7)
+        below.tick_params(labelsize=7)
+        if k % columns == 0 or view.shown is not views[k - 1].shown:
+            above.set_ylabel(view.shown.label, fontsize=8)
+            below.set_ylabel(view.shown.left_label, fontsize=8)
+        below.set_xlabel("time since contact (ms)", fontsize=8)
+        if k == 0:
+            above.legend(fontsize=7)
+        drawn.append((above, below))
+    return drawn
 
 
 def _divide(

@@ -74,6 +74,19 @@ def write_result(
     return _write_summary_diagnosis(found, folder, write_json)
 
 
+def say_result(found: Any) -> str | None:
+    """What the command prints of a result; None of what is none."""
+    if isinstance(found, Calibration):
+        return campaign_calibration_lines(found)
+    if isinstance(found, Diagnosis):
+        probabilities = dict(found.verdict.probabilities)
+        suggestions = suggest(found.bench, [found.nominal, *found.rivals], probabilities)
+        return campaign_diagnosis_lines(found, suggestions)
+    if isinstance(found, SummaryCalibration):
+        return calibration_lines(found)
+    return diagnosis_lines(found) if isinstance(found, SummaryDiagnosis) else None
+
+
 def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> tuple[dict, str]:
     summary = campaign_calibration_summary(found)
     write_json(folder / "calibration.json", summary)

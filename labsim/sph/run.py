@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from ..records import FloatArray
+from ..records import FloatArray, Summarised
 from . import particles as rows
 from .materials import find_law, solver_hash
 from .materials._parts import gas_energy
@@ -34,8 +35,8 @@ class Particles:
     speed_z: FloatArray
 
 
-@dataclass(frozen=True)
-class DropRun:
+@dataclass(frozen=True, repr=False)
+class DropRun(Summarised):
     """Arrays time (s, 0 at contact), depth (m), velocity (m/s, downwards), force (N, on the projectile) and shaft_work (J since
     contact, of the part of the force that acts along an upright surface) of shape (m,)."""
 
@@ -58,6 +59,16 @@ class DropRun:
     viscous_share: float  # heat of artificial viscosity until the stop, of the energy that was brought in
     solver: str
     warnings: tuple[str, ...] = ()
+
+    def summary(self) -> str:
+        """What was dropped, how deep and how long, how well the book of energy closes, and the warnings."""
+        law, stop = Path(self.setting.material.law).stem, "after" if self.stopped else "not at rest after"
+        first = (
+            f"{self.setting.projectile.tip} of {2e3 * self.setting.projectile.tip_radius:.3g} mm into {law}: "
+            f"{self.penetration_depth * 1e3:.4g} mm deep {stop} {self.stopping_time * 1e3:.4g} ms, "
+            f"energy {self.energy_error:+.2%}"
+        )
+        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
     @property
     def updates_per_s(self) -> float:

@@ -2,7 +2,7 @@
 
 Input: a table, or a file that a tracking program wrote. Output: TrackRows, in frames, seconds and pixels. Every module in this
 folder that has ``recognises(path) -> bool`` is a format, with NAME and ``read_points(path) -> {name: Points}``; the folder is
-listed, so a new format is one new file (docs/extend.md). ``table`` reads labsim's own ``track.csv`` and is asked last.
+listed, so a new format is one new file (docs/extend-measuring.md). ``table`` reads labsim's own ``track.csv`` and is asked last.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ A(z) = 2Rz - z² up to z = R (over R²). Free fall before, then
 
     z'' = g - A(z) (a + b v + c v²)        with b = 0, or free
 
-(Poncelet's law with the tip's area; see docs/tracking.md). For a given row of the surface, depth z(t) and speed v(t) of the
+(Poncelet's law with the tip's area; see docs/tracking-curve.md). For a given row of the surface, depth z(t) and speed v(t) of the
 motion already found, the law is linear in a, b, c, the first row and the first speed; so the row is the only thing searched
 for, and the motion is renewed from the law until it stands still. A force that sets in at once (A = 1) competes, for tips
 that are blunt. Laws are weighed by Akaike's criterion; what they disagree enters the uncertainty.

@@ -87,7 +87,7 @@ def test_raw_depth_and_stopping_time_at_the_seed_s_p_m(first: tuple[Path, str], 
     assert study["spacings_m"] == pytest.approx([1e-4, 0.5e-4])
     (depth, fine_depth), (stop, fine_stop) = study["penetration_depth_m"], study["stopping_time_s"]
     assert 0.78e-3 < depth < 0.95e-3 and 2.2e-3 < stop < 2.8e-3
-    # soft dust with so little viscosity does not settle as the spacing shrinks (docs/design.md); stiff dust does
+    # soft dust with so little viscosity does not settle as the spacing shrinks (docs/published-figures.md); stiff dust does
     most = {4.5e3: (0.03, 0.10), 300e3: (0.01, 0.01)}[k0]
     assert abs(fine_depth / depth - 1) < most[0] and abs(fine_stop / stop - 1) < most[1]
     # two independent planar codes gave -0.26 to -0.32; this one gives -0.30 (soft) to -0.34 (stiff)

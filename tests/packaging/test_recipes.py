@@ -1,4 +1,4 @@
-"""The recipes of docs/extend.md, taken from the page and put where their first line says: each works as printed."""
+"""The recipes of extend.md and extend-measuring.md, taken from the pages and put where they say: each works as printed."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from labsim.tracks import read_rows
 from labsim.video import open_frames
 
 ROOT = Path(__file__).parents[2]
+PAGES = ("extend.md", "extend-measuring.md")
 PACKAGES = {
     "labsim/tracks": labsim.tracks,
     "labsim/video/formats": labsim.video.formats,
@@ -40,10 +41,9 @@ PACKAGES = {
 
 
 def find_recipes() -> dict[str, str]:
-    """Path in the first line -> the text of every block of the page."""
-    blocks = re.findall(
-        r"```python\n(.*?)```", (ROOT / "docs/extend.md").read_text(encoding="utf-8"), re.DOTALL
-    )
+    """Path in the first line -> the text of every block of the pages."""
+    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in PAGES]
+    blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
     return {block.splitlines()[0].removeprefix("# "): block for block in blocks}
 
 

@@ -102,7 +102,7 @@ def test_rebound_is_found_and_does_not_spoil_the_depth() -> None:
     strict=True, reason="a kick shorter than a frame is taken for a push of some frames: T_s 2 % short"
 )
 def test_stopping_time_before_a_kick() -> None:
-    """A limit (docs/tracking.md): the speed jumps at the stop, and the rows do not tell it from a gradual rebound."""
+    """A limit (docs/tracking-accuracy.md): the speed jumps at the stop, and the rows do not tell it from a gradual rebound."""
     track, _ = make_track(1, 0.03, rebound=0.05, count=130)
     curve = fit_deceleration(track, CAMERA)
     assert curve.stopping_time.value == pytest.approx(3e-3, abs=6e-5)

@@ -1,6 +1,6 @@
 """The tracker against synthetic recordings with true rows (accuracy goals T1 to T14).
 
-``--junitxml=FILE`` keeps the figures that each test measured, as properties; docs/tracking.md quotes them.
+``--junitxml=FILE`` keeps the figures that each test measured, as properties; docs/tracking-accuracy.md quotes them.
 """
 
 from __future__ import annotations
