@@ -35,12 +35,14 @@ class Suggestion:
 
     change: str
     information_bits: float
-    tells: tuple[str, str] | None = None
+    tells: tuple[tuple[str, ...], tuple[str, ...]] | None = None
 
     @property
     def text(self) -> str:
         """What to do and what for."""
-        return self.change + (f", to tell {' from '.join(self.tells)}" if self.tells else "")
+        return self.change + (
+            f", to tell {' from '.join(' + '.join(names) for names in self.tells)}" if self.tells else ""
+        )
 
 
 def suggest(
@@ -122,14 +124,14 @@ def _suggest_pushes(
         return []
     rival = int(np.argmax(likely))
     count = max(1, math.ceil(2.0 * (DECIDED * bench.terms.scatter / apart[rival]) ** 2))
-    said = [" + ".join(names_of[k]) for k in (int(np.argmax(weights)), rival)]
+    best = int(np.argmax(weights))
     spread = np.array([[2.0 * bench.terms.scatter**2 / count]])
     bits = expected_information(np.array(ratios)[:, None], spread, np.array(weights) / sum(weights))
     return [
         Suggestion(
             f"{count} more push{'es' * (count > 1)} at {1e3 * slow:g} mm/s and as many at {1e3 * fast:g} mm/s, near each other",
             round(bits, 3),
-            (said[0], said[1]),
+            (names_of[best], names_of[rival]),
         )
     ]
 

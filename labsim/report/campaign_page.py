@@ -23,7 +23,7 @@ from .law_words import comes_nearest, describe_laws, size_of_missing
 from .map_views import MapView
 from .map_words import describe_maps
 from .page import read_picture, show_number, write_html
-from .phrases import CERTAIN, say_hypothesis, say_p_value, say_probability, state_p_value
+from .phrases import CERTAIN, say_hypothesis, say_p_value, say_probability, state_p_value, tile_gain
 from .provenance import trace_origin
 
 PICTURES = {
@@ -52,7 +52,6 @@ def write_campaign_page(
     posteriors = [(labels[0], found.posterior_nominal)]
     if len(labels) > 1:
         posteriors.append((labels[1], found.posterior_extended))
-    gain = summary["gain"]
     quantiles = summary["p_m_Pa"]
     (first, _), *others = found.verdict.named
     apart = [(other, p) for other, p in others if not set(first) < set(other)]
@@ -74,13 +73,19 @@ def write_campaign_page(
         if not comes_nearest(found) and (size := size_of_missing(found)):
             tiles.append(("what is missing", *size))
     elif len(labels) > 1:
-        percent = show_number(100 * gain["fraction_of_discrepancy_removed"], "{:.0f} %")
         extended = quantiles["extended"]
-        tiles.insert(1, (f"p_m with {labels[1]}", f"{extended['q50'] / 1e3:.2f} kPa", _between(extended)))
+        tiles.insert(
+            1,
+            (
+                f"p_m with {labels[1].replace('_', ' ')}",
+                f"{extended['q50'] / 1e3:.2f} kPa",
+                _between(extended),
+            ),
+        )
         if found.verdict.probabilities[0][1] < CERTAIN:
             middle, spread = quantiles["over_causes"]["q50"] / 1e3, _between(quantiles["over_causes"])
             tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
-        tiles.append(("gone on held-out drops", percent, "of the removable discrepancy"))
+        tiles.append(tile_gain(found.gain, "drops"))
     figures = _figures(found.bench, views, maps, posteriors)
     held = [(labels[0], found.held_out_nominal.rms)]
     if len(labels) > 1:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ..diagnosis.gain import Gain
 from ..diagnosis.untestable import Combination
 from ..effects import Parameter
 
@@ -37,8 +38,8 @@ def say_interval(middle: float, low: float, high: float) -> tuple[str, str, str]
 
 
 def say_hypothesis(hypothesis: Sequence[str]) -> str:
-    """Names of effects, and words where there is none."""
-    return " + ".join(SAID.get(name, name) for name in hypothesis)
+    """Names of effects as words, ``pixel scale + crust``, and what stands for none of them."""
+    return " + ".join(SAID.get(name, name.replace("_", " ")) for name in hypothesis)
 
 
 def add_article(label: str) -> str:
@@ -74,6 +75,17 @@ def state_p_value(value: float) -> str:
     """p = 0.31, p < 10⁻⁶."""
     said = say_p_value(value)
     return f"p {said}" if said[0] in "<>" else f"p = {said}"
+
+
+def tile_gain(gain: Gain, records: str) -> tuple[str, str, str]:
+    """Tile of a page: what the extension removes on held-out records, or that there was nothing to remove."""
+    if gain.rms_nominal <= gain.rms_noise:
+        return f"held-out {records}", "met without it", "nothing to remove: within the noise"
+    return (
+        f"gone on held-out {records}",
+        f"{100 * gain.fraction_removed:.0f} %" if math.isfinite(gain.fraction_removed) else "–",
+        "of the removable discrepancy",
+    )
 
 
 def say_count(number: int, noun: str) -> str:

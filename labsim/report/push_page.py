@@ -26,7 +26,7 @@ from .campaign_tables import say_calibrated, say_verdict
 from .cause_words import BADGES, describe_causes
 from .look import GREY, INK, new_figure
 from .page import read_picture, show_number, write_html
-from .phrases import say_hypothesis, say_p_value, say_probability, state_p_value
+from .phrases import say_hypothesis, say_p_value, say_probability, state_p_value, tile_gain
 from .provenance import trace_origin
 
 PICTURES = {
@@ -160,13 +160,7 @@ def write_push_diagnosis(
         ("most probable", say_hypothesis(first), f"probability {say_probability(found.verdict.of_first)}"),
     ]
     if found.best is not found.nominal:
-        tiles.append(
-            (
-                "gone on held-out pushes",
-                f"{100 * gain.fraction_removed:.0f} %",
-                "of the removable discrepancy",
-            )
-        )
+        tiles.append(tile_gain(gain, "pushes"))
     words = (
         f"Each push is held out once and predicted from the others: rms {100 * gain.rms_nominal:.1f} % with the nominal model, "
         f"{100 * gain.rms_extended:.1f} % with {fits[-1][0]}, {100 * gain.rms_noise:.1f} % expected of a true model."

@@ -35,8 +35,8 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
     said = []
     if len(found.verdict.named) > 1 and suggestions:
         best = suggestions[0]
-        names = best.tells or [say_hypothesis(hypothesis) for hypothesis, _ in found.verdict.named[:2]]
-        said.append(f"first tell {' from '.join(names)}: {best.change}")
+        pair = best.tells or [hypothesis for hypothesis, _ in found.verdict.named[:2]]
+        said.append(f"first tell {' from '.join(map(say_hypothesis, pair))}: {best.change}")
     for name in found.verdict.probabilities[0][0]:
         effect = found.bench.effects[name]
         value = 0.0

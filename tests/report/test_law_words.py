@@ -62,7 +62,7 @@ def test_what_is_not_clear_is_not_named_beside_it(found):
         (
             0.004,
             1600.0,
-            "strength_rate comes nearest, but does not predict drops that no fit has seen (p = 0.004).",
+            "strength rate comes nearest, but does not predict drops that no fit has seen (p = 0.004).",
         ),
         (
             0.004,

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from labsim.diagnosis.next_experiment import Suggestion
 from labsim.effects import list_effects
 from labsim.report.remedies import BY_KIND, say_remedy
 
@@ -35,9 +36,13 @@ def test_a_scale_says_what_to_write():
 
 def test_two_that_are_hardly_told_apart_are_to_be_told_apart_first():
     named = [(("shear_strength",), 0.6), (("tensile_strength",), 0.35)]
-    suggestion = SimpleNamespace(change="a bead of 2 mm at 0.3 m/s")
+    suggestion = Suggestion("a bead of 2 mm at 0.3 m/s", 1.0)
     said = say_remedy(find("effect", named, named=named), [suggestion])
-    assert said.startswith("First tell ") and "a bead of 2 mm at 0.3 m/s" in said
+    assert said.startswith("First tell shear strength from tensile strength: a bead of 2 mm at 0.3 m/s.")
+    pushes = Suggestion("4 more pushes", 1.0, (("strength_rate",), ("none",)))
+    assert pushes.text == "4 more pushes, to tell strength_rate from none"
+    said = say_remedy(find("effect", named, named=named), [pushes])
+    assert said.startswith("First tell strength rate from the nominal model: 4 more pushes.")
 
 
 def test_none_and_unknown_have_one_too():
