@@ -7,7 +7,7 @@ PySPH is timed in an environment of its own, made with
     python3 -m venv V && V/bin/pip install "setuptools<70" wheel "numpy<2" "cython<3.1" mako cyarray compyle pytools
     V/bin/pip install --no-build-isolation pysph
 CPU time of the process is what counts: wall time on a shared machine says nothing. One update is one particle moved by
-one step, list rebuilds included, compilation not. Prints Markdown for docs/performance.md.
+one step, list rebuilds included, compilation not. Prints Markdown for docs/performance-solver.md.
 """
 
 from __future__ import annotations

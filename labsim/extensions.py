@@ -11,7 +11,9 @@ Groups: ``labsim.track_formats``, ``labsim.video_formats``, ``labsim.ct_formats`
 
 from __future__ import annotations
 
+import functools
 import importlib
+import logging
 import pkgutil
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -40,6 +42,15 @@ def list_modules(package: str, group: str) -> dict[str, ModuleType]:
             raise _refuse(entry, group, f"is {module!r}, no module")
         found[entry.name] = module
     return found
+
+
+log = logging.getLogger(__name__)
+
+
+@functools.cache
+def announce_code(file: Path) -> None:
+    """Say, once, that a file which a campaign brings along is run: somebody else's code, also where little else is said."""
+    log.warning("runs %s/%s of this campaign (%s)", file.parent.name, file.name, file.parent.parent)
 
 
 def list_files(group: str, known: dict[str, Path]) -> dict[str, Path]:

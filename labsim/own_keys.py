@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import CampaignError, LabsimError
+from .extensions import announce_code
 from .records import Material, Motion
 from .tables import Table
 
@@ -117,13 +118,16 @@ def find_name(table: Table, key: str, name: str, folder: str, beside: Path | Non
     own = beside / folder / f"{name}.py" if beside is not None else None
     if own is not None and own.is_file():
         name = str(own)
+        announce_code(own.resolve())
     elif name not in there() and not (name.endswith(".py") and Path(name).is_file()):
         where = f", or put {name}.py into the campaign's {folder}/" if beside is not None else ""
         raise table.wrong(key, f"{name!r} is not known; write one of {_quote(there())}{where}")
     try:
-        find(name)
+        module = find(name)
     except Exception as trouble:
         raise table.wrong(key, f"{name}: cannot be loaded ({type(trouble).__name__}: {trouble})") from None
+    if not isinstance(getattr(module, "PARAMETERS", None), tuple):
+        raise table.wrong(key, f"{name}: has no PARAMETERS; write a tuple of them, () where there are none")
     return name
 
 

@@ -7,7 +7,6 @@ contract. Their code is run as it is, and each file is named before it is: take 
 from __future__ import annotations
 
 import inspect
-import logging
 import math
 import types
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import EffectError
-from ..extensions import list_files
+from ..extensions import announce_code, list_files
 from ..records import (
     STANDARD_GRAVITY,
     Camera,
@@ -33,7 +32,6 @@ from ..sph.materials import list_numbers
 from .contract import KINDS, OBSERVABLES, Effect, Parameter
 from .priors import HalfNormal, LogNormal, Normal, Uniform
 
-log = logging.getLogger(__name__)
 CATALOGUE = Path(__file__).parent / "catalogue"
 _loaded: dict[tuple[Path, int], Effect] = {}
 
@@ -82,10 +80,8 @@ def load_file(file: Path) -> Effect:
         raise EffectError(file, "", f"cannot be read ({trouble}); save it as UTF-8 text") from None
     key = (file, hash(source))
     if key not in _loaded:
-        if (
-            file.parent != CATALOGUE.resolve()
-        ):  # somebody else's code: said before it runs, also where little else is
-            log.warning("runs %s/%s of this campaign (%s)", file.parent.name, file.name, file.parent.parent)
+        if file.parent != CATALOGUE.resolve():
+            announce_code(file)
         _loaded[key] = _check(file, _run(file, source))
     return _loaded[key]
 

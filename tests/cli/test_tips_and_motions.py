@@ -106,7 +106,7 @@ def test_keys_of_a_campaign(campaign: Path, tmp_path: Path) -> None:
     assert run.setting.projectile.shape == stated.projectile.shape
 
 
-def test_files_of_a_campaign(campaign: Path) -> None:
+def test_files_of_a_campaign(campaign: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A tip, a motion and a law that lie in the campaign's own folders."""
     for folder, file in (
         ("tips", "cone"),
@@ -127,6 +127,17 @@ def test_files_of_a_campaign(campaign: Path) -> None:
     assert read.drops[0].motion.kind == str(campaign / "motions" / "my_pushed.py")
     assert read.material.law == str(campaign / "materials" / "my_clay.py")
     assert make_profile(read.drops[0].projectile).shape == (4, 9)
+    said = " ".join(record.getMessage() for record in caplog.records)
+    for file in ("tips/my_cone.py", "motions/my_pushed.py", "materials/my_clay.py"):
+        assert said.count(f"runs {file} of this campaign") == 1  # somebody else's code, said before it runs
+
+
+def test_a_tip_without_parameters_is_refused(campaign: Path) -> None:
+    (campaign / "tips").mkdir()
+    (campaign / "tips" / "bare.py").write_text('"""Nothing in it."""\n')
+    change(first_drop(campaign), CONE[0], 'tip = "bare"')
+    with pytest.raises(CampaignError, match="has no PARAMETERS"):
+        read_campaign(campaign)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...errors import InferenceError, LabsimError
-from ...extensions import list_modules
+from ...extensions import announce_code, list_modules
 from ...records import Campaign, FloatArray
 from ...sph.plugins import load_module
 from ..blocks import Block
@@ -145,6 +145,7 @@ def observe_further(campaign: Campaign) -> list[Observation]:
 def _list_kinds(folder: Path) -> Iterator[ModuleType]:
     yield from list_modules(__name__, "labsim.observations").values()
     for file in list_own_files(folder):
+        announce_code(file.resolve())
         try:
             content = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
             yield load_module(file, f"labsim_observations_{content}")
