@@ -26,7 +26,7 @@ def docs(
     pages = list_pages()
     if page is None:
         titles = {name: read_title(path) for name, path in pages.items()}
-        lines = [f"{name:16s} {title}" for name, title in titles.items()]
+        lines = [f"{name:{max(map(len, titles))}s}  {title}" for name, title in titles.items()]
         options.finish({"pages": titles}, "\n".join(lines), as_json=as_json, quiet=quiet)
         return
     name = Path(page).name.removesuffix(".md")

@@ -79,6 +79,32 @@ def lay_drops(views: Sequence[DropView], figure: Figure) -> list[tuple[Axes, Axe
     return drawn
 
 
+def draw_decisive(bench: Workbench, views: Sequence[DropView], path: Path, cause: Sequence[str]) -> str:
+    """The picture beside a verdict, and its caption: the undisturbed dust where the cause is one of the sample and a scan shows
+    it, else the drop in which the models part most (of one model the deepest)."""
+    kinds = {bench.effects[name].kind for name in cause if name in bench.effects}
+    if kinds == {"sample"} and bench.undisturbed:
+        draw_undisturbed(bench, path)
+        return "Undisturbed dust: its filling factor against depth, as the scans show it."
+    fits = list(views[0].simulated)
+
+    def part(view: DropView) -> float:
+        if len(fits) == 1:
+            return view.at_stop()
+        before, after = (np.sum((view.left(fit) / view.allowed) ** 2) for fit in fits[:2])
+        return float(before - after)
+
+    shown = max(views, key=part)
+    draw_drops([shown], path)
+    models = " and ".join(
+        "with " + fit.replace("_", " ") if fit != "nominal" else "as stated" for fit in fits
+    )
+    which = "in which the two part most" if len(fits) > 1 else "that goes deepest"
+    return (
+        f"{shown.name}, the drop {which}: measured, and simulated {models}; below, what is left, and what a true model may leave."
+    )
+
+
 def _divide(
     figure: Figure, lines: int, columns: int, *, right: float, wspace: float, hspace: float
 ) -> GridSpec:

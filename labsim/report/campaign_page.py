@@ -13,6 +13,7 @@ from ..inference.fitting import DOUBTFUL
 from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
+from .campaign_figures import draw_decisive
 from .campaign_tables import say_verdict
 from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
 from .cause_words import BADGES, describe_causes, describe_gain, describe_untestable, list_confusable
@@ -27,6 +28,7 @@ from .phrases import CERTAIN, say_hypothesis, say_p_value, say_probability, stat
 from .provenance import trace_origin
 
 PICTURES = {
+    "decisive": "What decides: measured, simulated, and what is left.",
     "drops": "Every drop: measured depth against time, each simulation, and below it what each leaves, with the band of what a "
     "true model may leave. The numbers stand in the table above.",
     "misfit": "Measured minus simulated depth at the stop, in percent, against impact speed.",
@@ -111,6 +113,7 @@ def write_campaign_page(
             found.nominal, found.p_value, found.scatter, posteriors, found.bench, len(views)
         ),
         diagnosed=True,
+        cause=found.verdict.probabilities[0][0],
         causes=causes,
         laws=laws,
         confusable=confusable,
@@ -216,6 +219,7 @@ def _write(
     warnings: Sequence[str],
     runs: tuple[int, int, float],
     diagnosed: bool,
+    cause: Sequence[str] = (),
     **values: Any,
 ) -> Path:
     contents = [
@@ -234,6 +238,7 @@ def _write(
         ]
     contents += [("numerics", "Numerical error"), ("warnings", "Warnings"), ("made", "Versions and hashes")]
     notes = {"drops": str(len(views)), "warnings": str(len(warnings)) if warnings else ""}
+    decisive = draw_decisive(bench, views, folder / "decisive.png", cause)
     pictures = {name: read_picture(folder / f"{name}.png", text) for name, text in PICTURES.items()}
     return write_html(
         folder / "report.html",
@@ -247,6 +252,7 @@ def _write(
         misfit=describe_misfit(views),
         maps=describe_maps(campaign, bench, maps) if campaign.scans else None,
         pictures=pictures,
+        decisive=decisive,
         diagnosed=diagnosed,
         warnings=warnings,
         made=trace_origin(
