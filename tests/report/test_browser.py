@@ -100,12 +100,22 @@ def test_without_scripts_and_on_paper_the_static_pictures_stand(effect, browser)
     context.close()
     page, _said, _ = open_page(browser, effect, 700)
     page.wait_for_selector("html[data-figures=drawn]", state="attached", timeout=60_000)
-    assert page.locator("img.static:visible").count() == 0
+    assert page.locator("img.static:visible").count() == page.locator(".decisive img").count() == 1
     page.emulate_media(media="print", color_scheme="dark")
     assert page.locator("img.static:visible").count() >= 4 and page.locator(".plot:visible").count() == 0
     assert page.evaluate("() => document.documentElement.scrollWidth") <= 700
     paper = page.pdf(format="A4", prefer_css_page_size=True)
     assert 50_000 < len(paper) < 5e6
+    page.close()
+
+
+def test_what_how_sure_why_and_what_next_are_on_the_first_screen(effect, browser) -> None:  # type: ignore[no-untyped-def]
+    page, _said, _ = open_page(browser, effect, 1280)
+    page.set_viewport_size({"width": 1280, "height": 800})
+    for part in (".verdict", ".decisive img", ".decisive figcaption", ".tiles"):
+        box = page.locator(part).first.bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] <= 800, part
+    assert "probability" in page.locator(".verdict").text_content()
     page.close()
 
 
