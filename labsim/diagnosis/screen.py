@@ -2,8 +2,8 @@
 
 Input: a Workbench and the nominal Fit. Output: a Screening with, for every effect, how far its fingerprint (the tangent after
 ln p_m and all nuisances are taken out) lies along the residual, what amplitude that asks for, and how alike the
-fingerprints are. Formulas: docs/diagnosis.md; Rao's score test, linear Gaussian Bayes factor, where ln p_m ends with its range
-and amplitudes with their limits.
+fingerprints are. Formulas: docs/diagnosis-method.md; Rao's score test, linear Gaussian Bayes factor, where ln p_m ends with its
+range and amplitudes with their limits.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A run is encoded as (ln D, ln T_s, s(τ)): depth over D at fixed fractions τ of the stopping time, to a little beyond the
 stop. These are smooth in every parameter even where the curve itself is not (its kink moves with the stop), so low
-polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/inference.md gives the measured error.
+polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.md gives the measured error.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ from .phrases import (
 from .remedies import say_remedy
 
 NUMERICAL_DEPTH = (
-    0.0033  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/numerics.md
+    0.0033  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/other-methods.md
 )
 
 MOST_SAID = 3  # causes that are not testable, on one line

@@ -1,6 +1,6 @@
-"""A curve without a model beside the fitted one: local parabolas, never across contact or stop.
+"""A curve without a model beside the fitted one: local cubics, never across contact or stop.
 
-Savitzky & Golay (1964) on the true, uneven times: at each frame a parabola through the frames within a window, cut at
+Savitzky & Golay (1964) on the true, uneven times: at each frame a cubic through the frames within a window, cut at
 contact and stop, where the acceleration jumps. Error bars follow from the linear weights of the rows.
 """
 

@@ -18,7 +18,7 @@ GALLERY = {  # which of its pictures stands for a notebook in docs/gallery.md; L
     "track_projectile": 1, "density_contour": 1, "calibrate_p_m": 1, "find_the_cause": 0, "real_soundings": 2,
     "seed_experiment": 0,
 }  # fmt: skip
-LONGEST = 900  # s for one cell on a loaded machine; docs/performance.md has what they take
+LONGEST = 900  # s for one cell on a loaded machine
 # name -> (pictures, what the printed text must hold)
 NOTEBOOKS = {
     "track_projectile": (3, [r"impact speed +0\.62\d", r"true over stated frame rate .*0\.9[45]"]),

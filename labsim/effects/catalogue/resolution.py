@@ -34,7 +34,7 @@ leaves = (
     "An error of depth with the sign and the shape of the difference between two spacings, largest for slow drops that "
     "press only a few particles; compare numerical_error in diagnosis.json."
 )
-references = ("Richardson extrapolation; docs/numerics.md for the measured order",)
+references = ("Richardson extrapolation; docs/convergence.md for the measured order",)
 expect: dict[str, int] = {}  # the sign is the scheme's and changes with speed
 
 

@@ -36,9 +36,9 @@ NUMERICAL_DEPTH = 0.03  # of the depth: slow, shallow drops differ by up to 4 % 
 NUMERICAL = ((0.04, 0.25), (0.06, 0.8))
 NUMERICAL_FLOOR = 0.0015
 STRENGTH = 0.15  # of ln p_m by which the zones of two codes differ, most under shallow drops
-CONTRAST = 0.10  # of φ - φ0 as a whole: docs/numerics.md, compacted volumes of two codes
+CONTRAST = 0.10  # of φ - φ0 as a whole: docs/other-methods.md, compacted volumes
 # error of an exponent on (φ - φ0) over its largest: how far the compaction reaches. Two codes approach each other from both
-# sides as they are refined; where φ - φ0 is a twentieth of its largest they differ by half of it (docs/numerics.md)
+# sides as they are refined; where φ - φ0 is a twentieth of its largest they differ by half of it (docs/dust-at-the-tip.md)
 REACH = 0.2
 
 

@@ -6,7 +6,7 @@
         (a random ln p_m per drop), numerical error of the solver (smooth over fraction of the stop, depth and size).
 
 Nuisances enter linearly about their current best values and are integrated out. Each term has a switch in Terms. Formulas:
-docs/inference.md.
+docs/likelihood-errors.md.
 """
 
 from __future__ import annotations
