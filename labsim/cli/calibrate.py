@@ -60,7 +60,9 @@ def calibrate(
     extended = read_model(model, list_effects(read)) if model is not None else None
     folder, opened = options.make_output_folder(out, campaign, "calibrate"), RunStore(store)
     found: Calibration | SummaryCalibration
-    with options.show_progress(quiet, options.CALIBRATE) as progress:
+    with options.show_progress(
+        quiet, options.CALIBRATE if read.has_records else options.PUBLISHED[:2]
+    ) as progress:
         settings: dict[str, Any] = {
             "workers": workers,
             "scheduler": scheduler,

@@ -53,7 +53,12 @@ def demo(
     settings: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
     summary: dict[str, Any] = {}
     said = []
-    with options.show_progress(quiet) as progress:
+    stages = {
+        Case.both: (*options.DIAGNOSE, "calibration runs", "prediction runs"),
+        Case.clay: options.DIAGNOSE,
+        Case.dust: options.PUBLISHED,
+    }
+    with options.show_progress(quiet, stages[case]) as progress:
         settings["progress"] = progress
         if case is not Case.dust:
             clay = diagnose_campaign(read_campaign(example("tiller")), opened, seed=seed, **settings)

@@ -37,7 +37,9 @@ def diagnose(
         )
     folder, opened = options.make_output_folder(out, campaign, "diagnose"), RunStore(store)
     found: Diagnosis | SummaryDiagnosis
-    with options.show_progress(quiet, options.DIAGNOSE) as progress:
+    with options.show_progress(
+        quiet, options.DIAGNOSE if read.has_records else options.PUBLISHED
+    ) as progress:
         settings: dict[str, Any] = {
             "workers": workers,
             "scheduler": scheduler,

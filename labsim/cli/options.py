@@ -168,6 +168,7 @@ class Progress(Protocol):
 OTHERS = ""  # of the stages: the one that all texts belong to that none of the others begins
 CALIBRATE = ("nominal model", "sampling the posterior")
 DIAGNOSE = ("nominal model", "what each cause changes", OTHERS, "sampling the posterior")
+PUBLISHED = ("calibration runs", "sampling the posterior", "prediction runs")
 
 
 class _Stage:

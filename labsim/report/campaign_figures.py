@@ -100,9 +100,8 @@ def draw_decisive(bench: Workbench, views: Sequence[DropView], path: Path, cause
         "with " + fit.replace("_", " ") if fit != "nominal" else "as stated" for fit in fits
     )
     which = "in which the two part most" if len(fits) > 1 else "that goes deepest"
-    return (
-        f"{shown.name}, the drop {which}: measured, and simulated {models}; below, what is left, and what a true model may leave."
-    )
+    seen = f"{shown.name}, the drop {which}: measured, and simulated {models}"
+    return f"{seen}; below, what is left, and what a true model may leave."
 
 
 def _divide(

@@ -36,7 +36,11 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
     if len(found.verdict.named) > 1 and suggestions:
         best = suggestions[0]
         pair = best.tells or [hypothesis for hypothesis, _ in found.verdict.named[:2]]
-        said.append(f"first tell {' from '.join(map(say_hypothesis, pair))}: {best.change}")
+        further = [name for name in pair[1] if name not in pair[0]]
+        if set(pair[0]) < set(pair[1]):  # the first is at work either way
+            said.append(f"to tell whether {say_hypothesis(further)} is at work too: {best.change}")
+        else:
+            said.append(f"first tell {' from '.join(map(say_hypothesis, pair))}: {best.change}")
     for name in found.verdict.probabilities[0][0]:
         effect = found.bench.effects[name]
         value = 0.0

@@ -70,7 +70,9 @@ def test_the_wheel_holds_code_and_the_data_of_the_demo(wheel: Path) -> None:
         assert name.removeprefix("labsim/") in {each.removeprefix("labsim/") for each in names}, name
     assert "labsim/data/guettler2009/campaign.toml" in names
     assert not any(name.startswith(("tests/", "data/", "notebooks/")) for name in names)
-    assert wheel.stat().st_size < 4_500_000  # of which the soundings in clay are 0.4 MB, the campaign with scans 2 MB
+    assert (
+        wheel.stat().st_size < 4_500_000
+    )  # of which the soundings in clay are 0.4 MB, the campaign with scans 2 MB
 
 
 def test_the_sdist_builds_the_same_wheel(tmp_path: Path, wheel: Path) -> None:

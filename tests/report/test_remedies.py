@@ -43,6 +43,9 @@ def test_two_that_are_hardly_told_apart_are_to_be_told_apart_first():
     assert pushes.text == "4 more pushes, to tell strength_rate from none"
     said = say_remedy(find("effect", named, named=named), [pushes])
     assert said.startswith("First tell strength rate from the nominal model: 4 more pushes.")
+    beside = Suggestion("6 more pushes", 1.0, (("strength_rate",), ("strength_rate", "gauge_warming")))
+    said = say_remedy(find("effect", named, named=named), [beside])
+    assert said.startswith("To tell whether gauge warming is at work too: 6 more pushes.")
 
 
 def test_none_and_unknown_have_one_too():
