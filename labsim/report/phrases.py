@@ -28,13 +28,15 @@ def say_amount(parameter: Parameter, value: float) -> str:
 
 
 def say_interval(middle: float, low: float, high: float) -> tuple[str, str, str]:
-    """A value and the ends of its interval, with as many digits as the interval's width asks for: at least three, two of the
-    width's own."""
+    """A value and the ends of its interval, with the decimals that the interval's width asks for: two of its own digits, six in
+    all at most."""
     largest, width = max(abs(low), abs(middle), abs(high)), high - low
-    digits = 3
-    if width > 0.0 and math.isfinite(width) and largest > 0.0:
-        digits = min(max(3, math.floor(math.log10(largest)) - math.floor(math.log10(width)) + 2), 6)
-    return f"{middle:.{digits}g}", f"{low:.{digits}g}", f"{high:.{digits}g}"
+    if not (math.isfinite(largest) and 1e-4 <= largest < 1e6):
+        return f"{middle:.3g}", f"{low:.3g}", f"{high:.3g}"
+    order = math.floor(math.log10(largest))
+    digits = 3 if width <= 0.0 else min(max(2, order - math.floor(math.log10(width)) + 2), 6)
+    decimals = max(0, digits - 1 - order)
+    return f"{middle:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
 
 
 def say_hypothesis(hypothesis: Sequence[str]) -> str:
