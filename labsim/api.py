@@ -335,7 +335,8 @@ def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> 
     Returns
     -------
     list of (Axes, Axes)
-        Per drop its motion (mm against ms) and what is left of it (µm) with the band that is allowed for.
+        Per drop its motion (mm against ms) and what is left of it (µm) with the band that is allowed for. Of pushes one pair: the
+        net resistance against depth, and the misfit of every push against its speed.
     """
     from .report.axes import plot_drops as draw
 

@@ -14,8 +14,10 @@ from ..diagnosis.campaign import Diagnosis
 from ..inference.calibrate import Calibration
 from ..records import FloatArray
 from .campaign_figures import lay_drops, size_drops
+from .campaign_tables import is_pushed
 from .drop_views import view_drops
 from .look import BLUE, GREY, INK, PHI
+from .push_page import lay_misfit, lay_pushes, view_pushes
 
 
 def plot_depth(curve: pd.DataFrame, ax: Axes | None = None) -> Axes:
@@ -79,5 +81,12 @@ def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> 
             fits.append((" + ".join(found.best.hypothesis), found.best))
     else:
         fits = [(" + ".join(found.fit.hypothesis) or "calibrated", found.fit)]
+    if is_pushed(found.bench):
+        pushes = view_pushes(found.bench, fits)
+        drawn = plt.figure(figsize=(12.0, 4.6), layout="constrained") if figure is None else figure
+        left, right = drawn.subplots(1, 2)
+        lay_pushes(pushes, left)
+        lay_misfit(pushes, right)
+        return [(left, right)]
     views = view_drops(found.bench, fits)
     return lay_drops(views, plt.figure(figsize=size_drops(views)) if figure is None else figure)

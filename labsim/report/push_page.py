@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 
@@ -81,54 +82,62 @@ def view_pushes(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[PushV
 
 def draw_pushes(views: Sequence[PushView], path: Path) -> Path:
     """Net resistance against depth, a line a push."""
+    with new_figure(path, 6.4, 5.2) as figure:
+        lay_pushes(views, figure.subplots())
+    return path
+
+
+def lay_pushes(views: Sequence[PushView], ax: Axes) -> None:
+    """Net resistance against depth, a line a push, on axes."""
     speeds = [1e3 * view.speed for view in views]
     norm = LogNorm(min(speeds) * 0.95, max(speeds) * 1.05)
-    with new_figure(path, 6.4, 5.2) as figure:
-        ax = figure.subplots()
-        for view, speed in sorted(zip(views, speeds, strict=True), key=lambda each: each[1]):
-            observed, colour = view.model.observed, colormaps["viridis"](norm(speed))
-            net = observed.record.pressure - observed.weight * observed.record.depth
-            ax.plot(net / 1e6, observed.record.depth, color=colour, lw=0.5, alpha=0.5)
-            ax.plot(np.exp(observed.resistance) / 1e6, observed.depth, ".-", color=colour, lw=1.1, ms=4)
-        top = np.quantile([np.exp(view.model.data.max()) for view in views], 0.9)
-        ax.set_xlim(0.0, 1.5 * top / 1e6)
-        ax.invert_yaxis()
-        ax.set_xlabel("net resistance (MPa)")
-        ax.set_ylabel("depth (m)")
-        bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=ax)
-        bar.set_label("speed (mm/s)")
-        ticks = sorted({round(speed, 3) for speed in speeds})
-        bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
-        bar.ax.minorticks_off()
-    return path
+    for view, speed in sorted(zip(views, speeds, strict=True), key=lambda each: each[1]):
+        observed, colour = view.model.observed, colormaps["viridis"](norm(speed))
+        net = observed.record.pressure - observed.weight * observed.record.depth
+        ax.plot(net / 1e6, observed.record.depth, color=colour, lw=0.5, alpha=0.5)
+        ax.plot(np.exp(observed.resistance) / 1e6, observed.depth, ".-", color=colour, lw=1.1, ms=4)
+    top = np.quantile([np.exp(view.model.data.max()) for view in views], 0.9)
+    ax.set_xlim(0.0, 1.5 * top / 1e6)
+    ax.invert_yaxis()
+    ax.set_xlabel("net resistance (MPa)")
+    ax.set_ylabel("depth (m)")
+    bar = ax.figure.colorbar(ScalarMappable(norm, "viridis"), ax=ax)
+    bar.set_label("speed (mm/s)")
+    ticks = sorted({round(speed, 3) for speed in speeds})
+    bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    bar.ax.minorticks_off()
 
 
 def draw_misfit(views: Sequence[PushView], path: Path) -> Path:
     """Mean misfit of every push against its speed, one colour a model."""
     with new_figure(path, 6.4, 3.6) as figure:
-        ax = figure.subplots()
-        ax.axhline(0.0, color=INK, lw=0.8)
-        for k, (label, colour) in enumerate(zip(views[0].left, COLOURS, strict=False)):
-            ax.errorbar(
-                [1e3 * view.speed * (1.0 + 0.03 * k) for view in views],
-                [100 * view.mean(label) for view in views],
-                [200 * view.allowed for view in views],
-                fmt="o",
-                ms=4,
-                lw=0.7,
-                capsize=2,
-                color=colour,
-                label=label,
-            )
-        ax.set_xscale("log")
-        ticks = sorted({round(1e3 * view.speed, 3) for view in views})
-        ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=8)
-        ax.minorticks_off()
-        ax.set_xlabel("speed (mm/s)")
-        ax.set_ylabel("measured over simulated − 1 (%)")
-        ax.legend(fontsize=8)
-        ax.grid(axis="y", color=GREY, alpha=0.2)
+        lay_misfit(views, figure.subplots())
     return path
+
+
+def lay_misfit(views: Sequence[PushView], ax: Axes) -> None:
+    """Mean misfit of every push against its speed, on axes."""
+    ax.axhline(0.0, color=INK, lw=0.8)
+    for k, (label, colour) in enumerate(zip(views[0].left, COLOURS, strict=False)):
+        ax.errorbar(
+            [1e3 * view.speed * (1.0 + 0.03 * k) for view in views],
+            [100 * view.mean(label) for view in views],
+            [200 * view.allowed for view in views],
+            fmt="o",
+            ms=4,
+            lw=0.7,
+            capsize=2,
+            color=colour,
+            label=label.replace("_", " "),
+        )
+    ax.set_xscale("log")
+    ticks = sorted({round(1e3 * view.speed, 3) for view in views})
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=8)
+    ax.minorticks_off()
+    ax.set_xlabel("speed (mm/s)")
+    ax.set_ylabel("measured over simulated − 1 (%)")
+    ax.legend(fontsize=8)
+    ax.grid(axis="y", color=GREY, alpha=0.2)
 
 
 def write_push_diagnosis(
