@@ -6,7 +6,15 @@ const KEPT = 200e6; // bytes of pictures that stay decoded
 let state = null, shown = 0, zoom = 0, tool = "look", points = [], cursor = null, timer = 0, dirty = false;
 const pictures = new Map();
 
-async function ask(path, body) {
+// One question after the other: two quick clicks would else be answered in any order, and the page would show the older state.
+let answered = Promise.resolve();
+function ask(path, body) {
+  const answer = answered.then(() => send(path, body));
+  answered = answer.catch(() => {});
+  return answer;
+}
+
+async function send(path, body) {
   const options = body === undefined ? {} : { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
   let answer;
   try { answer = await fetch(path, options); } catch { throw new Error("labsim view has ended; start it again"); }
