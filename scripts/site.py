@@ -25,7 +25,8 @@ def on_files(files, config):
 
 
 def on_page_content(content, page, config, files):
-    """Formulas, $…$ and $$…$$ of a page, as MathML."""
+    """Formulas, $…$ and $$…$$ of a page, as MathML; blocks of code, which may be wider than the page, scroll by keyboard too."""
+    content = content.replace("<pre>", '<pre tabindex="0">')
     return FORMULA.sub(
         lambda found: convert(
             html.unescape(found[2].strip()), display="block" if found[1] == "div" else "inline"
