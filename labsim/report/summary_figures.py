@@ -72,7 +72,7 @@ def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
         setting = runs[middle].setting
         axes.set_title(
             f"{2e3 * setting.projectile.tip_radius:g} mm cylinder at {setting.impact_speed:g} m/s, "
-            f"K0 {calibration.bulk_modulus / 1e3:g} kPa; at each stop its p_m"
+            f"$K_0$ {calibration.bulk_modulus / 1e3:g} kPa; at each stop its $p_\\mathrm{{m}}$"
         )
     return path
 
@@ -121,7 +121,9 @@ def draw_depth_law(diagnosis: SummaryDiagnosis, path: Path) -> Path:
         axes.annotate(" stated from here up", (1.0, 0.03), xycoords=("data", "axes fraction"), color=GREY)
         axes.set(xlabel="m v/A (kg m⁻¹ s⁻¹)", ylabel="penetration depth (mm)", xlim=(0, None), ylim=(0, None))
         factor = round_depth(1.0, calibration.depth_reading)
-        axes.set_title(f"simulated depth = {factor:.3f} x raw planar depth, p_m from {_used(calibration)}")
+        axes.set_title(
+            f"simulated depth = {factor:.3f} x raw planar depth, $p_\\mathrm{{m}}$ from {_used(calibration)}"
+        )
         axes.legend(loc="upper left")
     return path
 
@@ -159,7 +161,7 @@ def draw_compacted_volume(diagnosis: SummaryDiagnosis, path: Path) -> Path:
             axes.set(ylim=(1e-3, None))
             axes.set_title(
                 f"{2e3 * run.setting.projectile.tip_radius:g} mm at {run.setting.impact_speed:.2f} m/s, "
-                f"p_m {run.setting.material.p_m / 1e3:.2f} kPa"
+                f"$p_\\mathrm{{m}}$ {run.setting.material.p_m / 1e3:.2f} kPa"
             )
         axes.set(
             xlabel="volume filling factor φ",
@@ -195,7 +197,11 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
         corner.corner(
             data,
             fig=figure,
-            labels=["p_m (kPa)", f"raw depth of {drop} (mm)", f"T_s of {drop} (ms)"],
+            labels=[
+                "$p_\\mathrm{m}$ (kPa)",
+                f"raw depth of {drop} (mm)",
+                f"$T_\\mathrm{{s}}$ of {drop} (ms)",
+            ],
             truths=truths,
             truth_color=ORANGE,
             color=BLUE,
@@ -209,7 +215,12 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
             data_kwargs={"alpha": 0.05, "ms": 2.0},
         )
         figure.text(
-            0.98, 0.98, f"p_m from {_used(calibration)}\norange: published", ha="right", va="top", color=INK
+            0.98,
+            0.98,
+            f"$p_\\mathrm{{m}}$ from {_used(calibration)}\norange: published",
+            ha="right",
+            va="top",
+            color=INK,
         )
     return path
 
@@ -229,7 +240,9 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
             outputs = emulator.predict(p_m[:, None])
             runs = calibration.runs[drop, k0]
             for axes, column, name in ((depth, 0, "penetration_depth"), (stop, 1, "stopping_time")):
-                axes.loglog(p_m / 1e3, outputs[:, column] * 1e3, color=colour, label=f"K0 {k0 / 1e3:g} kPa")
+                axes.loglog(
+                    p_m / 1e3, outputs[:, column] * 1e3, color=colour, label=f"$K_0$ {k0 / 1e3:g} kPa"
+                )
                 axes.plot(
                     [run.setting.material.p_m / 1e3 for run in runs],
                     [getattr(run, name) * 1e3 for run in runs], "o", ms=4, color=colour,
@@ -245,7 +258,7 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
             )
             stop.axhline(at.value * 1e3, color=INK, lw=1.0, label=f"{at.value * 1e3:.1f} ms, published")
         for axes, label in ((depth, "raw depth (mm)"), (stop, "stopping time (ms)")):
-            axes.set(xlabel="p_m (kPa)", ylabel=label)
+            axes.set(xlabel="$p_\\mathrm{m}$ (kPa)", ylabel=label)
             axes.set_xticks([0.2, 0.5, 1, 2, 5], ["0.2", "0.5", "1", "2", "5"])
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
@@ -268,8 +281,8 @@ def draw_fit(calibration: SummaryCalibration, path: Path) -> Path:
         ticks = [t for t in (0.2, 0.3, 0.5, 1, 2, 3, 5) if forest.get_xlim()[0] <= t <= forest.get_xlim()[1]]
         forest.set_xticks(ticks, [f"{t:g}" for t in ticks])
         forest.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
-        forest.set(xlabel="p_m (kPa), median and 90 %")
-        forest.set_title("orange: this one; grey: no p_m fits both (χ² > 6.6)")
+        forest.set(xlabel="$p_\\mathrm{m}$ (kPa), median and 90 %")
+        forest.set_title("orange: this one; grey: no $p_\\mathrm{m}$ fits both (χ² > 6.6)")
         depth.set_title(f"{drop}: emulator (lines) and its runs (dots)")
     return path
 
