@@ -7,7 +7,6 @@ say ``workers=1``.
 
 from __future__ import annotations
 
-import inspect
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -27,9 +26,10 @@ if TYPE_CHECKING:  # pragma: no cover
     from .diagnosis.campaign import Diagnosis
     from .diagnosis.summary import SummaryDiagnosis
     from .inference.calibrate import Calibration
+    from .inference.posterior import Posterior
     from .inference.runs import RunStore
     from .inference.summary import SummaryCalibration
-    from .report.axes import Axes, Figure
+    from .report.outputs import Axes, Figure
     from .sph import DropRun, DropSetting
     from .video.following import Progress
 
@@ -69,13 +69,9 @@ def track(
     """
     from .tracking import measure, read_request
 
-    if isinstance(source, np.ndarray):
-        given = {name: value for name, value in locals().items() if name in _OF_TRACK}
-        with _lay_down(source, "frames") as pages:
-            return track(pages, **given)
-    tracked = measure(
-        read_request(
-            source,
+    with _on_disk(source, "frames") as record:
+        request = read_request(
+            record,
             frame_rate=frame_rate,
             pixel_size=None if pixel_size is None else Measured(pixel_size, pixel_size_sigma),
             rod_diameter=None if rod_diameter is None else Measured(rod_diameter, rod_diameter_sigma),
@@ -88,9 +84,8 @@ def track(
             frames=frames,
             columns=columns,
             particle=particle,
-        ),
-        progress,
-    )
+        )
+        tracked = measure(request, progress)
     return tracked.track, tracked.curve
 
 
@@ -130,10 +125,6 @@ def reduce_scan(
     from .campaign import read_scan
     from .campaign_scans import NEEDED, complete_stack
 
-    if isinstance(source, np.ndarray):
-        given = {name: value for name, value in locals().items() if name in _OF_SCAN}
-        with _lay_down(source, "slices") as pages:
-            return reduce_scan(pages, **given, **settings)
     # key of scan.toml -> what was given, as the key has it, and what it is called here
     keys = {
         "radius_mm": (bead_radius and bead_radius * 1e3, "bead_radius"),
@@ -148,21 +139,20 @@ def reduce_scan(
     for key, (value, _) in keys.items():
         if value is not None:
             stated[NEEDED.get(key, "scan")][key] = value
-    if isinstance(source, Scan):
-        if any(stated.values()):
+    with _on_disk(source, "slices") as slices:
+        if not isinstance(slices, Scan):
+            names = {key: name for key, (_, name) in keys.items()}
+            given = complete_stack(Path(slices), stated, names)
+            slices = read_scan(slices, given=given, speed_required=False)
+        elif any(stated.values()):
             raise CampaignError(
-                source.name, "scan", "is read already; give its folder to change what it says"
+                slices.name, "scan", "is read already; give its folder to change what it says"
             )
-        scan: Any = source
-    else:
-        names = {key: name for key, (_, name) in keys.items()}
-        given = complete_stack(Path(source), stated, names)
-        scan = read_scan(source, given=given, speed_required=False)
-    if not isinstance(scan, Scan):
-        raise CampaignError(
-            source, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
-        )
-    return ct.reduce_scan(scan, **settings)
+        if not isinstance(slices, Scan):
+            raise CampaignError(
+                source, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
+            )
+        return ct.reduce_scan(slices, **settings)
 
 
 def simulate(
@@ -290,7 +280,7 @@ def plot(found: Any, ax: Axes | None = None) -> Axes:
     ----------
     found : DecelerationCurve, (Track, DecelerationCurve), DropRun, ReducedScan, Calibration or Diagnosis
         A curve or a run is drawn as depth (mm) against time (ms), a scan as its map of the filling factor (mm), a calibration or
-        diagnosis as the posterior of p_m (kPa), with the cause where one is found.
+        diagnosis as the posterior of what it calibrates, p_m of dust (kPa), beside the cause where one is found.
     ax : matplotlib Axes, optional
         The current axes by default.
 
@@ -311,11 +301,8 @@ def plot(found: Any, ax: Axes | None = None) -> Axes:
         from .ct import make_dataset
 
         return axes.plot_filling_factor(make_dataset(found), ax)
-    posterior = getattr(found, "posterior_extended", None) or getattr(found, "posterior", None)
-    if posterior is None and hasattr(found, "calibration"):
-        posterior = found.calibration.posterior
-    if posterior is not None:
-        return axes.plot_density(posterior.samples("p_m_Pa"), "p_m_Pa", ax)
+    if (posterior := _find_posterior(found)) is not None:
+        return axes.plot_density(posterior.calibrated, posterior.names[0], ax)
     table = tabulate(found)
     if "depth_m" not in table:
         raise TypeError(f"{type(found).__name__} has no picture of its own; tabulate() gives its numbers")
@@ -338,7 +325,7 @@ def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> 
         Per drop its motion (mm against ms) and what is left of it (µm) with the band that is allowed for. Of pushes one pair: the
         net resistance against depth, and the misfit of every push against its speed.
     """
-    from .report.axes import plot_drops as draw
+    from .report.outputs import plot_drops as draw
 
     return draw(found, figure)
 
@@ -380,33 +367,37 @@ def tabulate(thing: Any) -> pd.DataFrame:
         )  # planar: per metre of cylinder
         columns: dict[str, FloatArray] = {"time_s": thing.time, "depth_m": thing.depth}
         return pd.DataFrame({**columns, "velocity_m_s": thing.velocity, force: thing.force})
-    posterior = getattr(thing, "posterior_extended", None) or getattr(thing, "posterior", None)
-    if posterior is not None:
+    if (posterior := _find_posterior(thing)) is not None:
         return pd.DataFrame({name: posterior.samples(name) for name in posterior.names})
     raise TypeError(
         f"{type(thing).__name__} is no table; give a track, curve, volume, run, calibration or diagnosis"
     )
 
 
-_OF_TRACK = [name for name in inspect.signature(track).parameters if name != "source"]
-_OF_SCAN = [name for name in inspect.signature(reduce_scan).parameters if name not in ("source", "settings")]
-
-
 @contextmanager
-def _lay_down(pictures: npt.NDArray[Any], what: str) -> Iterator[Path]:
-    """Pictures in memory as pages of a TIFF, for as long as they are read."""
+def _on_disk(source: Any, what: str) -> Iterator[Any]:
+    """The source itself; pictures in memory as pages of a TIFF, for as long as they are read."""
+    if not isinstance(source, np.ndarray):
+        yield source
+        return
     import tifffile
 
-    if pictures.ndim != 3 or pictures.dtype not in (np.uint8, np.uint16):
+    if source.ndim != 3 or source.dtype not in (np.uint8, np.uint16):
         raise MeasurementError(
             what,
             "array",
-            f"is {pictures.dtype} of shape {pictures.shape}; give uint8 or uint16 as ({what}, rows, columns)",
+            f"is {source.dtype} of shape {source.shape}; give uint8 or uint16 as ({what}, rows, columns)",
         )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{what}.tif"
-        tifffile.imwrite(path, np.ascontiguousarray(pictures), photometric="minisblack")
+        tifffile.imwrite(path, np.ascontiguousarray(source), photometric="minisblack")
         yield path
+
+
+def _find_posterior(found: Any) -> Posterior | None:
+    """Of a calibration or diagnosis: with the cause, where one is found."""
+    found = getattr(found, "calibration", found)  # of published figures
+    return getattr(found, "posterior_extended", None) or getattr(found, "posterior", None)
 
 
 def _read(campaign: Campaign | Path | str) -> Campaign:

@@ -26,12 +26,17 @@ STANDARD_GRAVITY = (
 class Summarised:
     """What a record is in a few lines: so it shows itself in a shell and in a notebook, however many numbers it holds."""
 
-    def summary(self) -> str:
-        """The record in a few lines, the first of which says what it is."""
+    def say(self) -> str:
+        """What the record is, in one line."""
         raise NotImplementedError
 
+    def summary(self) -> str:
+        """The record in a few lines: what it is, and its warnings."""
+        warnings = getattr(self, "warnings", ())
+        return "\n".join([self.say(), *(f"warning: {text}" for text in warnings)])
+
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.summary().splitlines()[0]}>"
+        return f"<{type(self).__name__}: {self.say()}>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(self.summary())}</pre>"
@@ -309,13 +314,17 @@ class Campaign(Summarised):
         """Whether a drop was recorded; of the others only published figures are known."""
         return any(drop.record.kind != "summary" for drop in self.drops)
 
-    def summary(self) -> str:
+    def say(self) -> str:
         """Its name, and how much of what is in it."""
         kinds = collections.Counter(drop.record.kind for drop in self.drops)
         held = [f"{count} drops ({kind})" for kind, count in kinds.items()]
         held += [f"{len(self.scans)} CT scans"] * bool(self.scans)
         held += [f"{len(self.strength_tests)} static tests"] * bool(self.strength_tests)
-        return f"{self.name}, {', '.join(held)}\n{self.description}".rstrip()
+        return f"{self.name}, {', '.join(held)}"
+
+    def summary(self) -> str:
+        """What is in it, and what it says of itself."""
+        return f"{self.say()}\n{self.description}".rstrip()
 
 
 @dataclass(frozen=True, repr=False)
@@ -333,12 +342,11 @@ class Track(Summarised):
     reason: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
-    def summary(self) -> str:
-        """How many frames, how good, and the warnings."""
+    def say(self) -> str:
+        """How many frames, and how good."""
         rejected = int(np.sum(~self.valid))
         sigma = float(np.median(self.sigma[self.valid])) if self.valid.any() else math.nan
-        first = f"{self.frame.size} frames, {rejected} rejected, rows to {sigma:.3f} px"
-        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
+        return f"{self.frame.size} frames, {rejected} rejected, rows to {sigma:.3f} px"
 
 
 @dataclass(frozen=True, repr=False)
@@ -372,14 +380,13 @@ class DecelerationCurve(Summarised):
     # s, (m,) times of the track's frames as the fit took them: not the track's where frames were lost silently
     clock: FloatArray | None = None
 
-    def summary(self) -> str:
-        """Speed, depth and stopping time, and the warnings."""
+    def say(self) -> str:
+        """Depth, speed and stopping time."""
         depth, speed, stop = self.penetration_depth, self.impact_speed, self.stopping_time
-        first = (
+        return (
             f"{depth.value * 1e3:.4g} ± {depth.sigma * 1e3:.2g} mm deep from {speed.value:.4g} ± {speed.sigma:.2g} m/s in "
             f"{stop.value * 1e3:.4g} ± {stop.sigma * 1e3:.2g} ms"
         )
-        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
 
 @dataclass(frozen=True, repr=False)
@@ -400,14 +407,13 @@ class FillingMap(Summarised):
     axis_px: tuple[float, float]
     warnings: tuple[str, ...] = ()
 
-    def summary(self) -> str:
-        """Size, the tip's depth, the filling factors that occur, and the warnings."""
+    def say(self) -> str:
+        """Size, the tip's depth, and the filling factors that occur."""
         low, high = np.nanquantile(self.filling_factor, [0.01, 0.99])
-        first = (
+        return (
             f"{self.z.size} x {self.r.size} cells to {self.r[-1] * 1e3:.3g} mm from the axis, tip {self.tip_depth * 1e3:.3g} mm "
             f"deep, filling factor {low:.2g} to {high:.2g}"
         )
-        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
 
 @dataclass(frozen=True, repr=False)
@@ -422,7 +428,7 @@ class CompressedVolume(Summarised):
     sigma: FloatArray
     sphere_volume: float  # m^3, of the projectile's tip sphere
 
-    def summary(self) -> str:
+    def say(self) -> str:
         """The volume that is denser than the threshold in the middle of those it has."""
         k = self.filling_factor.size // 2
         volume, sigma = self.volume[k], self.sigma[k]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -187,3 +188,14 @@ def test_pictures_of_records_are_matplotlib_axes() -> None:
     plt.close(figure)
     with pytest.raises(TypeError, match="Track has no picture"):
         labsim.plot(tracked[0])
+
+
+def test_the_posterior_of_another_law_is_drawn_by_its_own_name() -> None:
+    draws = np.random.default_rng(1).normal(9e4, 5e3, 400)
+    posterior = SimpleNamespace(names=("cohesion_Pa",), calibrated=draws, samples=lambda name: draws)
+    found = SimpleNamespace(posterior=posterior)
+    figure, ax = plt.subplots()
+    labsim.plot(found, ax)
+    assert ax.get_xlabel() == "cohesion (kPa)"
+    plt.close(figure)
+    assert list(labsim.tabulate(found)) == ["cohesion_Pa"]

@@ -58,6 +58,10 @@ class ReducedScan(Summarised):
     masked: np.ndarray  # (nz, nr) True where a cell touches the bead's guard
     facts: dict = field(default_factory=dict)
 
+    def say(self) -> str:
+        """Its name, and what its map is."""
+        return f"{self.scan.name}, {self.map.say()}"
+
     def summary(self) -> str:
         """The map, the undisturbed dust, and what is known about the picture."""
         still = f"undisturbed filling factor {self.undisturbed.value:.4g} ± {self.undisturbed.sigma:.1g}"

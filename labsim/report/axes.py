@@ -7,17 +7,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from ..diagnosis.campaign import Diagnosis
-from ..inference.calibrate import Calibration
 from ..records import FloatArray
-from .campaign_figures import lay_drops, size_drops
-from .campaign_tables import is_pushed
-from .drop_views import view_drops
 from .look import BLUE, GREY, INK, PHI
-from .push_page import lay_misfit, lay_pushes, view_pushes
 
 
 def plot_depth(curve: pd.DataFrame, ax: Axes | None = None) -> Axes:
@@ -71,22 +64,3 @@ def plot_density(draws: FloatArray, name: str, ax: Axes | None = None) -> Axes:
         xlabel=f"{shown} (kPa)" if pressure else shown, ylabel="posterior density; dashed: 90 %", yticks=[]
     )
     return ax
-
-
-def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
-    """Every drop measured and simulated, and below it what is left; of a diagnosis both models. Two axes a drop."""
-    if isinstance(found, Diagnosis):
-        fits = [("nominal", found.nominal)]
-        if found.best is not found.nominal:
-            fits.append((" + ".join(found.best.hypothesis), found.best))
-    else:
-        fits = [(" + ".join(found.fit.hypothesis) or "calibrated", found.fit)]
-    if is_pushed(found.bench):
-        pushes = view_pushes(found.bench, fits)
-        drawn = plt.figure(figsize=(12.0, 4.6), layout="constrained") if figure is None else figure
-        left, right = drawn.subplots(1, 2)
-        lay_pushes(pushes, left)
-        lay_misfit(pushes, right)
-        return [(left, right)]
-    views = view_drops(found.bench, fits)
-    return lay_drops(views, plt.figure(figsize=size_drops(views)) if figure is None else figure)

@@ -79,13 +79,14 @@ def lay_drops(views: Sequence[DropView], figure: Figure) -> list[tuple[Axes, Axe
     return drawn
 
 
-def draw_decisive(bench: Workbench, views: Sequence[DropView], path: Path, cause: Sequence[str]) -> str:
-    """The picture beside a verdict, and its caption: the undisturbed dust where the cause is one of the sample and a scan shows
-    it, else the drop in which the models part most (of one model the deepest)."""
+def choose_decisive(
+    bench: Workbench, views: Sequence[DropView], folder: Path, cause: Sequence[str]
+) -> tuple[str, str]:
+    """Name and caption of the picture beside a verdict: of the undisturbed dust where the cause is one of the sample and a scan
+    shows it, else of the drop in which the models part most (of one model the deepest), which is drawn."""
     kinds = {bench.effects[name].kind for name in cause if name in bench.effects}
     if kinds == {"sample"} and bench.undisturbed:
-        draw_undisturbed(bench, path)
-        return "Undisturbed dust: its filling factor against depth, as the scans show it."
+        return "undisturbed", "Undisturbed dust: its filling factor against depth, as the scans show it."
     fits = list(views[0].simulated)
 
     def part(view: DropView) -> float:
@@ -95,13 +96,13 @@ def draw_decisive(bench: Workbench, views: Sequence[DropView], path: Path, cause
         return float(before - after)
 
     shown = max(views, key=part)
-    draw_drops([shown], path)
+    draw_drops([shown], folder / "decisive.png")
     models = " and ".join(
         "with " + fit.replace("_", " ") if fit != "nominal" else "as stated" for fit in fits
     )
     which = "in which the two part most" if len(fits) > 1 else "that goes deepest"
     seen = f"{shown.name}, the drop {which}: measured, and simulated {models}"
-    return f"{seen}; below, what is left, and what a true model may leave."
+    return "decisive", f"{seen}; below, what is left, and what a true model may leave."
 
 
 def _divide(

@@ -13,11 +13,11 @@ from ..inference.fitting import DOUBTFUL
 from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
-from .campaign_figures import draw_decisive
+from .campaign_figures import choose_decisive
 from .campaign_tables import say_verdict
 from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
 from .cause_words import BADGES, describe_causes, describe_gain, describe_untestable, list_confusable
-from .drop_views import DropView
+from .drop_views import DropView, list_posteriors
 from .interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
 from .law_figures import plot_law
 from .law_words import comes_nearest, describe_laws, size_of_missing
@@ -51,9 +51,7 @@ def write_campaign_page(
 ) -> Path:
     """report.html of a diagnosis, its summary and the static pictures that lie in the folder."""
     labels = list(views[0].simulated)
-    posteriors = [(labels[0], found.posterior_nominal)]
-    if len(labels) > 1:
-        posteriors.append((labels[1], found.posterior_extended))
+    posteriors = list_posteriors(found)
     quantiles = summary["p_m_Pa"]
     (first, _), *others = found.verdict.named
     apart = [(other, p) for other, p in others if not set(first) < set(other)]
@@ -238,7 +236,7 @@ def _write(
         ]
     contents += [("numerics", "Numerical error"), ("warnings", "Warnings"), ("made", "Versions and hashes")]
     notes = {"drops": str(len(views)), "warnings": str(len(warnings)) if warnings else ""}
-    decisive = draw_decisive(bench, views, folder / "decisive.png", cause)
+    shown, decisive = choose_decisive(bench, views, folder, cause)
     pictures = {name: read_picture(folder / f"{name}.png", text) for name, text in PICTURES.items()}
     return write_html(
         folder / "report.html",
@@ -251,7 +249,7 @@ def _write(
         measurement=describe_measurement(campaign, bench, views),
         misfit=describe_misfit(views),
         maps=describe_maps(campaign, bench, maps) if campaign.scans else None,
-        pictures=pictures,
+        pictures=pictures | {"decisive": pictures[shown]},
         decisive=decisive,
         diagnosed=diagnosed,
         warnings=warnings,

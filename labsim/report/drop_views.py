@@ -8,11 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..diagnosis.campaign import Diagnosis
+from ..inference.calibrate import Calibration
 from ..inference.fitting import Fit
 from ..inference.forward import Instant, predict_depth
 from ..inference.observations.acceleration_model import AccelerationModel
 from ..inference.observations.drop_model import DropModel
 from ..inference.observations.push_model import PushModel
+from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import STANDARD_GRAVITY, FloatArray, Projectile
 
@@ -95,6 +98,20 @@ class DropView:
     def stands_out(self, fit: str) -> bool:
         """Whether more frames lie outside two standard deviations than a true model would leave (one in ten)."""
         return bool(np.mean(np.abs(self.left(fit)) > 2 * self.allowed) > 0.1)
+
+
+def list_fits(found: Calibration | Diagnosis) -> list[tuple[str, Fit]]:
+    """The models that are shown of a result, by name: of a diagnosis nominal and, where one is found, with the cause."""
+    if isinstance(found, Calibration):
+        return [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)]
+    extended = [] if found.best is found.nominal else [(" + ".join(found.best.hypothesis), found.best)]
+    return [("nominal", found.nominal), *extended]
+
+
+def list_posteriors(found: Diagnosis) -> list[tuple[str, Posterior]]:
+    """The posteriors of ``list_fits``, by the same names."""
+    names = [name for name, _ in list_fits(found)]
+    return list(zip(names, (found.posterior_nominal, found.posterior_extended), strict=False))
 
 
 def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropView]:

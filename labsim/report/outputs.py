@@ -6,10 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 from .. import text_files
 from ..campaign_tables import MATERIAL_KEYS
 from ..diagnosis.campaign import Diagnosis
-from ..diagnosis.next_experiment import suggest
+from ..diagnosis.next_experiment import Suggestion, suggest
 from ..diagnosis.summary import SummaryDiagnosis
 from ..effects import Model, list_effects, write_model
 from ..inference.calibrate import Calibration
@@ -27,10 +31,10 @@ from .campaign_tables import (
     is_pushed,
     state_numerical_error,
 )
-from .drop_views import DropView, view_drops
+from .drop_views import DropView, list_fits, list_posteriors, view_drops
 from .law_figures import draw_laws
 from .map_views import MapView, measure_maps, view_maps
-from .push_page import write_push_calibration, write_push_diagnosis
+from .push_page import lay_misfit, lay_pushes, view_pushes, write_push_calibration, write_push_diagnosis
 from .run_figures import draw_density_field
 from .summary_figures import (
     draw_compacted_volume,
@@ -79,12 +83,29 @@ def say_result(found: Any) -> str | None:
     if isinstance(found, Calibration):
         return campaign_calibration_lines(found)
     if isinstance(found, Diagnosis):
-        probabilities = dict(found.verdict.probabilities)
-        suggestions = suggest(found.bench, [found.nominal, *found.rivals], probabilities)
-        return campaign_diagnosis_lines(found, suggestions)
+        return campaign_diagnosis_lines(found, _suggest(found))
     if isinstance(found, SummaryCalibration):
         return calibration_lines(found)
     return diagnosis_lines(found) if isinstance(found, SummaryDiagnosis) else None
+
+
+def _suggest(found: Diagnosis) -> list[Suggestion]:
+    return suggest(found.bench, [found.nominal, *found.rivals], dict(found.verdict.probabilities))
+
+
+def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
+    """Every drop measured and simulated, and below it what is left; of pushes all at once and their misfit. Pairs of axes."""
+    fits = list_fits(found)
+    if is_pushed(found.bench):
+        pushes = view_pushes(found.bench, fits)
+        drawn = plt.figure(figsize=(12.0, 4.6), layout="constrained") if figure is None else figure
+        left, right = drawn.subplots(1, 2)
+        lay_pushes(pushes, left)
+        lay_misfit(pushes, right)
+        return [(left, right)]
+    views = view_drops(found.bench, fits)
+    drawn = plt.figure(figsize=figures.size_drops(views)) if figure is None else figure
+    return figures.lay_drops(views, drawn)
 
 
 def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> tuple[dict, str]:
@@ -95,7 +116,7 @@ def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> t
         write_push_calibration(found, folder)
         return summary, campaign_calibration_lines(found)
     figures.draw_posterior(found.posterior, folder / "corner.png")
-    views, maps = _draw_fits(found, [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)], folder)
+    views, maps = _draw_fits(found, list_fits(found), folder)
     (folder / "drops.png").rename(folder / "fit.png")
     figures.draw_p_m([("calibrated", found.posterior)], folder / "posterior.png")
     write_calibration_page(found, summary, state_numerical_error(found.bench), views, maps, folder)
@@ -103,8 +124,7 @@ def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> t
 
 
 def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple[dict, str]:
-    probabilities = dict(found.verdict.probabilities)
-    suggestions = suggest(found.bench, [found.nominal, *found.rivals], probabilities)
+    suggestions = _suggest(found)
     summary = campaign_diagnosis_summary(found, suggestions)
     write_json(folder / "diagnosis.json", summary)
     write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
@@ -112,11 +132,7 @@ def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple
     if is_pushed(found.bench):
         write_push_diagnosis(found, summary, suggestions, folder)
         return summary, campaign_diagnosis_lines(found, suggestions)
-    fits = [("nominal", found.nominal)]
-    posteriors = [("nominal", found.posterior_nominal)]
-    if found.best is not found.nominal:
-        fits.append((" + ".join(found.best.hypothesis), found.best))
-        posteriors.append((fits[1][0], found.posterior_extended))
+    fits = list_fits(found)
     views, maps = _draw_fits(found, fits, folder)
     figures.draw_causes(found, folder / "causes.png")
     (folder / "law.png").unlink(missing_ok=True)
@@ -124,7 +140,7 @@ def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple
         learned = found.learned.best if found.learned else None
         draw_laws(found.unknown.laws, folder / "law.png", learned)
     figures.draw_held_out(found, [name for name, _ in fits], folder / "held_out.png")
-    figures.draw_p_m(posteriors, folder / "posterior.png")
+    figures.draw_p_m(list_posteriors(found), folder / "posterior.png")
     figures.draw_posterior(found.posterior_extended, folder / "corner.png")
     write_campaign_page(found, summary, suggestions, views, maps, folder)
     return summary, campaign_diagnosis_lines(found, suggestions)

@@ -25,6 +25,7 @@ from ..records import FloatArray
 from .campaign_figures import COLOURS, draw_causes, draw_held_out, draw_p_m
 from .campaign_tables import say_calibrated, say_verdict
 from .cause_words import BADGES, describe_causes
+from .drop_views import list_fits, list_posteriors
 from .look import GREY, INK, new_figure
 from .page import read_picture, show_number, write_html
 from .phrases import say_hypothesis, say_p_value, say_probability, state_p_value, tile_gain
@@ -144,15 +145,12 @@ def write_push_diagnosis(
     found: Diagnosis, summary: dict, suggestions: list[Suggestion], folder: Path
 ) -> Path:
     """Pictures and report.html of a diagnosis."""
-    fits, posteriors = [("nominal", found.nominal)], [("nominal", found.posterior_nominal)]
-    if found.best is not found.nominal:
-        fits.append((" + ".join(found.best.hypothesis), found.best))
-        posteriors.append((fits[1][0], found.posterior_extended))
+    fits = list_fits(found)
     views = _draw(found, fits, folder)
     law = found.campaign.material.law
     draw_causes(found, folder / "causes.png")
     draw_held_out(found, [label for label, _ in fits], folder / "held_out.png", (100.0, "%"))
-    draw_p_m(posteriors, folder / "posterior.png", show_parameter(law))
+    draw_p_m(list_posteriors(found), folder / "posterior.png", show_parameter(law))
     first, _ = found.verdict.named[0]
     gain, label = found.gain, show_parameter(law)[0]
     tiles = [
@@ -183,7 +181,7 @@ def write_push_diagnosis(
 
 def write_push_calibration(found: Calibration, folder: Path) -> Path:
     """Pictures and report.html of a calibration."""
-    views = _draw(found, [(" + ".join(found.fit.hypothesis) or "nominal", found.fit)], folder)
+    views = _draw(found, list_fits(found), folder)
     label, unit, factor = show_parameter(found.campaign.material.law)
     draw_p_m([("calibrated", found.posterior)], folder / "posterior.png", (label, unit, factor))
     low, middle, high = np.quantile(found.posterior.calibrated, [0.05, 0.5, 0.95]) * factor

@@ -60,15 +60,14 @@ class DropRun(Summarised):
     solver: str
     warnings: tuple[str, ...] = ()
 
-    def summary(self) -> str:
-        """What was dropped, how deep and how long, how well the book of energy closes, and the warnings."""
+    def say(self) -> str:
+        """What was dropped, how deep and how long, and how well the book of energy closes."""
         law, stop = Path(self.setting.material.law).stem, "after" if self.stopped else "not at rest after"
-        first = (
+        return (
             f"{self.setting.projectile.tip} of {2e3 * self.setting.projectile.tip_radius:.3g} mm into {law}: "
             f"{self.penetration_depth * 1e3:.4g} mm deep {stop} {self.stopping_time * 1e3:.4g} ms, "
             f"energy {self.energy_error:+.2%}"
         )
-        return "\n".join([first, *(f"warning: {text}" for text in self.warnings)])
 
     @property
     def updates_per_s(self) -> float:
