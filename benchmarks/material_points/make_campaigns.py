@@ -1,9 +1,10 @@
-"""Make labelled campaigns with the material-point solver: 15 drops as tracks and two CT scans each.
+"""Make labelled campaigns with the material-point solver: 15 drops as tracks and two CT scans, or six drops felt by a sensor.
 
     python benchmarks/material_points/make_campaigns.py OUT [--plan PLAN.toml] [--only c01,c02] [--workers 1]
 
 Writes OUT/c01, OUT/c02, … (campaign folders, format 1) and OUT/truth.json; a folder appears when it is complete, and a
-second call makes what is missing. The plan says what is hidden in each (plan.toml beside this file).
+second call makes what is missing. The plan says what is hidden in each (plan.toml beside this file; acceleration.toml for those
+whose projectiles carry an accelerometer, ``record = "acceleration"``).
 """
 
 from __future__ import annotations
@@ -15,18 +16,20 @@ import shutil
 import time
 import tomllib
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from drop import GRAVITY, Body, Dust, Numerics, run_drop
+from drop import GRAVITY, Body, Dust, Numerics, extrapolate_drop, run_drop
+from feel import SCALE_SIGMA, Sensing, write_felt
 from film import HEIGHT_SIGMA, Filming, film, write_drop
 from scan import write_scan
 
 BEAD = 2540.0 * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 SMALL, LARGE = 0.5e-3, 1.5e-3
-NUMERICS = Numerics(cells=8.0, courant=0.35)
+NUMERICS = Numerics(cells=8.0)  # and half as many again, for the limit of no cell size
+# a map has no limit of two runs: one run whose projectile is felt a sixth of a cell around it, as deep as the limit to 0.6 %
+MAPPED = Numerics(cells=12.0, width=5.0, height=5.0, near=3.0, gap=0.17)
 SCATTER = 0.02  # of p_m from sample to sample, where the plan says no other
 FILLING = 0.150  # as stated
 # radius (m), mass over a bead's, nominal speed (m/s), film after contact (s)
@@ -36,6 +39,14 @@ SERIES = (
     *((LARGE, 1.0, speed, 10.7e-3) for speed in (0.20, 0.40, 0.40, 0.70)),
     (LARGE, 2.5, 0.30, 16.3e-3),
 )
+# radius, mass over a bead's, nominal speed, where an accelerometer takes the place of the camera and nothing is scanned
+FELT = (
+    *((0.75e-3, 1.0, speed) for speed in (0.35, 0.80)),
+    (0.75e-3, 2.5, 0.50),
+    *((1.5e-3, 1.0, speed) for speed in (0.25, 0.60)),
+    (1.5e-3, 2.5, 0.35),
+)
+RATES, NOISES = (2e3, 50e3), (0.001, 0.02)  # Hz; over the peak: drawn between, evenly in the logarithm
 SCANS = (0.75, 0.37)  # m/s
 REST = 2.0  # of the stopping time: a bead is scanned after it has come to rest, some of its depth above the deepest point
 
@@ -95,18 +106,36 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     folder.mkdir(parents=True)
     p_m, scatter = float(hidden["pm"]), hidden.get("scatter", SCATTER)
     measure = hidden.get("measure", {})
-    sequence = rng.permutation(len(SERIES)) + 1
+    felt = hidden.get("record") == "acceleration"
+    series = [(*each, 0.0) for each in FELT] if felt else SERIES
+    if felt:
+        rate, noise = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in (RATES, NOISES))
+        sensing = Sensing(rate, noise, 1.0 + SCALE_SIGMA * rng.normal())
+    sequence = rng.permutation(len(series)) + 1
     drops = {}
-    for k, (radius, heavier, nominal, after) in enumerate(SERIES):
+    for k, (radius, heavier, nominal, after) in enumerate(series):
         mass = BEAD * radius**3 * heavier
         speed = nominal * rng.uniform(0.94, 1.06)
         own = p_m * (1.0 + scatter * rng.normal())
-        own *= 1.0 + hidden.get("drift", 0.0) * ((sequence[k] - 1) / (len(SERIES) - 1) - 0.5)
+        own *= 1.0 + hidden.get("drift", 0.0) * ((sequence[k] - 1) / (len(series) - 1) - 0.5)
         if radius < 1e-3:
             own *= hidden.get("small_strength", 1.0)
         body = body_of(hidden, radius, mass * measure.get("mass", 1.0))
-        result = run_drop(dust_of(hidden, own), body, speed, NUMERICS, stop_factor=1.12)
+        result = extrapolate_drop(dust_of(hidden, own), body, speed, NUMERICS, stop_factor=1.12)
         assert result.stopping_time > 0.0, f"{name} drop {k + 1} did not stop"
+        label = f"D{k + 1:02d}"
+        drops[label] = {
+            "true_v0": speed,
+            "true_depth": result.stopping_depth,
+            "true_stopping_time": result.stopping_time,
+            "p_m": float(own),
+        }
+        if felt:
+            write_felt(
+                folder / "drops" / label, result, sensing, rng,
+                radius=radius, mass=mass, sequence=int(sequence[k]), speed=speed,
+            )  # fmt: skip
+            continue
         filming = Filming(
             frame_rate=10000.0 if radius < 1e-3 else 5000.0,
             pixel_size=20e-6 if radius < 1e-3 else 40e-6,
@@ -118,29 +147,22 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
         )
         frames, rows, surface = film(result, speed, filming, rng)
         height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * rng.normal()
-        label = f"D{k + 1:02d}"
         write_drop(
             folder / "drops" / label, frames, rows, surface,
             radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5), filming=filming,
         )  # fmt: skip
-        drops[label] = {
-            "true_v0": speed,
-            "true_depth": result.stopping_depth,
-            "true_stopping_time": result.stopping_time,
-            "p_m": float(own),
-        }
     scans = {}
     ct = hidden.get("ct", {})
-    for k, nominal in enumerate(SCANS):
+    for k, nominal in enumerate(() if felt else SCANS):
         speed = nominal * rng.uniform(0.94, 1.06)
         own = p_m * (1.0 + scatter * rng.normal()) * hidden.get("small_strength", 1.0)
         mass = BEAD * SMALL**3
         dust = dust_of(hidden, own)
         body = body_of(hidden, SMALL, mass * measure.get("mass", 1.0), sphere=True)
-        result = run_drop(dust, body, speed, replace(NUMERICS, height=5.0), stop_factor=REST)
+        result = run_drop(dust, body, speed, MAPPED, stop_factor=REST)
         blur = ct["blur_mm"] * 1e-3 if "blur_mm" in ct else None
         scans[f"C{k + 1:02d}"] = write_scan(
-            folder / "ct" / f"C{k + 1:02d}", result, dust, SMALL, mass, speed, SMALL / NUMERICS.cells, rng,
+            folder / "ct" / f"C{k + 1:02d}", result, dust, SMALL, mass, speed, SMALL / MAPPED.cells, rng,
             ct.get("scale", 1.0), blur,
         )  # fmt: skip
     (folder / "campaign.toml").write_text(campaign_toml(name))

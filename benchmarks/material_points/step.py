@@ -1,4 +1,8 @@
-"""One drop by material points: APIC transfers on an r-z grid with quadratic B-splines, ring masses, a symmetric axis.
+"""One drop by material points: an r-z grid with quadratic B-splines, ring masses, a symmetric axis.
+
+Velocities go to the grid with their gradient (APIC: Jiang et al. 2015). A point gets the grid's new velocity back, and keeps the
+share ``own`` of what it had beyond the grid's old one (0: APIC; 1: the increment alone, as in FLIP; between: Fei et al. 2021).
+APIC alone takes a share of the motion with every step, so that its depths fall with the time step.
 
 A rigid projectile on the axis (the hemispherical end of a rod, or a sphere) is a condition on the grid's nodes
 inside it: they may move away along its normal, never into it. The impulses of that condition are the force on it.
@@ -67,6 +71,7 @@ def advance(
     stop_factor,
     curve,
     interval,
+    own,
 ):
     """Run from contact to ``stop_factor`` times the stopping time (or ``end``, s).
 
@@ -75,6 +80,7 @@ def advance(
     body: radius, mass, speed downwards, is_sphere, contact friction, gap (cells), height of the tip at the start (m).
     forces: side friction N/m, drag of the shaft kg/m^2 per immersed metre, constant pull N once in contact,
          dust accreted (share of the mass per radius of depth).
+    own: share of a point's velocity beyond the grid's that it keeps.
     curve: (n, 3) time, depth, speed; written every ``interval``. Returns entries written, steps, stopping time, depth then.
     """
     k0, shear_to_bulk, shear_factor, eta, rate_n, gas, solid, gravity = law[:8]
@@ -88,6 +94,8 @@ def advance(
     m = np.zeros((nr, nz))
     pr = np.zeros((nr, nz))
     pz = np.zeros((nr, nz))
+    qr = np.zeros((nr, nz))
+    qz = np.zeros((nr, nz))
     k_floor = 2  # nodes at and below this index do not move
     z0 = z_floor - k_floor * h
     vb = -math.sqrt(speed * speed - 2.0 * gravity * tip)
@@ -114,6 +122,8 @@ def advance(
         m[:] = 0.0
         pr[:] = 0.0
         pz[:] = 0.0
+        qr[:] = 0.0
+        qz[:] = 0.0
         for k in range(n):
             p = points[k]
             i0, j0, fx, fy, wx, wy, gx, gy = reach_nodes(p[R], p[Z], z0, inv_h)
@@ -135,13 +145,17 @@ def advance(
                     i = i0 + a + 1  # one column left of the axis
                     j = j0 + b
                     m[i, j] += mp * w
-                    pr[i, j] += mp * w * (p[VR] + p[CRR] * dx + p[CRZ] * dy) - srr * dwx - srz * dwy - stt * w
-                    pz[i, j] += mp * w * (p[VZ] + p[CZR] * dx + p[CZZ] * dy) - srz * dwx - szz * dwy
+                    qr[i, j] += mp * w * (p[VR] + p[CRR] * dx + p[CRZ] * dy)
+                    qz[i, j] += mp * w * (p[VZ] + p[CZR] * dx + p[CZZ] * dy)
+                    pr[i, j] -= srr * dwx + srz * dwy + stt * w
+                    pz[i, j] -= srz * dwx + szz * dwy
         # the column left of the axis is the image of the one right of it
         for j in range(nz):
             m[2, j] += m[0, j]
             pr[2, j] -= pr[0, j]
             pz[2, j] += pz[0, j]
+            qr[2, j] -= qr[0, j]
+            qz[2, j] += qz[0, j]
         impulse = 0.0
         for i in range(1, nr):
             r = (i - 1) * h
@@ -150,9 +164,15 @@ def advance(
                 if mi < lightest:
                     pr[i, j] = 0.0
                     pz[i, j] = 0.0
+                    qr[i, j] = 0.0
+                    qz[i, j] = 0.0
                     continue
-                u = pr[i, j] / mi
-                v = pz[i, j] / mi - gravity * dt
+                qr[i, j] /= mi
+                qz[i, j] /= mi
+                if i == 1:
+                    qr[i, j] = 0.0
+                u = qr[i, j] + pr[i, j] / mi
+                v = qz[i, j] + pz[i, j] / mi - gravity * dt
                 if i == 1:
                     u = 0.0
                 z = z0 + j * h
@@ -183,6 +203,8 @@ def advance(
         for j in range(nz):
             pr[0, j] = -pr[2, j]
             pz[0, j] = pz[2, j]
+            qr[0, j] = -qr[2, j]
+            qz[0, j] = qz[2, j]
         # the projectile
         depth = max(-tip, 0.0)
         mass = mass0 * (1.0 + accreted * depth / radius)
@@ -201,7 +223,7 @@ def advance(
             i0, j0, fx, fy, wx, wy, gx, gy = reach_nodes(p[R], p[Z], z0, inv_h)
             if i0 + 3 >= nr or j0 < 0 or j0 + 2 >= nz:
                 continue
-            u = v = crr = crz = czr = czz = lrr = lrz = lzr = lzz = 0.0
+            u_old = v_old = u = v = crr = crz = czr = czz = lrr = lrz = lzr = lzz = 0.0
             for a in range(3):
                 dx = (a - fx) * h
                 for b in range(3):
@@ -213,6 +235,8 @@ def advance(
                     vi = pz[i, j]
                     u += w * ui
                     v += w * vi
+                    u_old += w * qr[i, j]
+                    v_old += w * qz[i, j]
                     crr += w * ui * dx
                     crz += w * ui * dy
                     czr += w * vi * dx
@@ -226,8 +250,8 @@ def advance(
             p[CRZ] = crz * to_c
             p[CZR] = czr * to_c
             p[CZZ] = czz * to_c
-            p[VR] = u
-            p[VZ] = v
+            p[VR] = u + own * (p[VR] - u_old)
+            p[VZ] = v + own * (p[VZ] - v_old)
             hoop = u / p[R]
             p[R] = abs(p[R] + dt * u)
             p[Z] += dt * v
