@@ -176,7 +176,7 @@ def read_drop(path: Path | str, *, given: Mapping[str, Mapping[str, Any]] | None
     if kind == "track":
         _check_track(record.path, camera)  # type: ignore[arg-type]
     if record.path is not None and accelerometer is not None:
-        check_acceleration(record.path, accelerometer)
+        accelerometer = check_acceleration(record.path, accelerometer)
     if record.path is not None and gauge is not None:
         check_force(record.path, gauge, projectile.tip_radius)
     return Drop(

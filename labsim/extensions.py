@@ -6,7 +6,7 @@ A package joins with a table in its pyproject.toml, here for a video format:
     my_camera = "my_package.my_camera"
 
 Groups: ``labsim.track_formats``, ``labsim.video_formats``, ``labsim.ct_formats``, ``labsim.force_formats``,
-``labsim.observations``, ``labsim.effects``, ``labsim.terms``.
+``labsim.acceleration_formats``, ``labsim.observations``, ``labsim.effects``, ``labsim.terms``.
 """
 
 from __future__ import annotations

@@ -141,8 +141,8 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Accelerometer:
-    """What stands on the projectile. sensors : of one record, finest range first; unit : m/s² of one of its numbers;
-    reads_at_rest : m/s² upwards, gravity or nothing."""
+    """What stands on the projectile. time_column : of a table, "" where the format has a clock; sensors : of one record, finest
+    range first; unit : m/s² of one of its numbers; reads_at_rest : m/s² upwards, gravity or nothing."""
 
     time_column: str
     sensors: tuple[Sensor, ...]

@@ -78,9 +78,9 @@ row_sigma_px = 0.1                  # optional: standard error of a row
 
 # [record]                          # instead: an accelerometer on the projectile; then without [camera]
 # kind = "acceleration"
-# file = "acceleration.csv"           # beside this file; a heading, then one row a sample
-# time_column = "time_s"              # in seconds
-# acceleration_column = "a_g"         # upwards positive; ["low_g", "high_g"] for several sensors
+# file = "acceleration.csv"           # beside this file; a heading, then one row a sample; or an .ide file
+# time_column = "time_s"              # in seconds; not of an .ide file, which has a clock
+# acceleration_column = "a_g"         # upwards positive; ["low_g", "high_g"] for several sensors; of an .ide file "-Z (40g)"
 # unit = "g"                          # or "m/s^2", of the column and of the four keys below
 # reads_at_rest = 1.0                 # 1.0: a sensor at rest reads 1 g upwards; 0.0: nothing
 # sigma = 0.05                        # noise of a sample; like the next three a list where there are several sensors

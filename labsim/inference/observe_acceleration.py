@@ -74,7 +74,7 @@ def observe_impact(drop: Drop) -> ObservedImpact:
     if inside < FEWEST:
         raise MeasurementError(
             drop.record.path,
-            drop.accelerometer.time_column,
+            drop.accelerometer.time_column or "time",
             f"has {inside} stretches of {width * 1e3:.3g} ms in the dust, too few to compare; sample faster or widen range",
         )
     shares = np.array(

@@ -1,25 +1,29 @@
 """An accelerometer's record as what the projectile feels: specific force against time, contact, stop, and the depth between.
 
 A sensor at rest feels gravity upwards, in free flight nothing, in the dust the force on the projectile over its mass. Input: a
-table with named columns, and what drop.toml says of its sensors. Output: SI, upwards positive. The depth is integrated for
-people and for a start; the likelihood compares the acceleration itself (inference/observations/acceleration_model.py).
+record, and what drop.toml says of its sensors. Output: SI, upwards positive. The depth is integrated for people and for a
+start; the likelihood compares the acceleration itself (inference/observations/acceleration_model.py).
+
+One file a format, found by listing this folder: ``SUFFIXES`` that it reads and ``read(path, accelerometer) -> Readings``. What
+no format claims is a table with named columns (``table.py``).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from .errors import CampaignError, MeasurementError
-from .records import STANDARD_GRAVITY, Accelerometer, Drop, FloatArray, Measured, Sensor
-from .tables import Table
-from .tracks.lines import read_named_columns
+from ..errors import CampaignError, MeasurementError
+from ..extensions import list_modules
+from ..records import STANDARD_GRAVITY, Accelerometer, Drop, FloatArray, Measured, Sensor
+from ..tables import Table
 
 UNITS = {"g": STANDARD_GRAVITY, "m/s^2": 1.0}
 FEWEST = 30  # samples
+LARGEST = 1e9  # s, or units of a reading; beyond it nothing is believed
 NEAR_RANGE = 0.99  # of the range, from where a sensor is taken as saturated
 SHORT, LONG = 1e-7, 2e-3  # s, between which a sampling interval of an impact is believed
 SEEN = 5.0  # standard deviations: of a reading that is more than noise
@@ -27,6 +31,16 @@ LOST = 1.5  # sampling intervals: a longer one is a gap
 FLIGHT = 5  # samples of rest and of flight that a release takes
 RELEASE = 10.0  # ln of the odds
 REST = 0.5  # of gravity: a level that is further off is no offset but another unit, sign or rest
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What a format's reader finds. time : s, (n,); values : m/s², (n, sensors), in the order of the accelerometer's sensors, NaN
+    where nothing was read; ranges : m/s², one a sensor, inf where the file states none."""
+
+    time: FloatArray
+    values: FloatArray
+    ranges: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -95,7 +109,7 @@ def read_accelerometer(table: Table) -> Accelerometer:
         for name, s, o, c, r in zip(columns, sigma, offset, scale, reach, strict=True)
     ]
     return Accelerometer(
-        table.text("time_column"),
+        table.text("time_column", ""),
         tuple(sorted(sensors, key=lambda each: each.range)),
         unit,
         at_rest * STANDARD_GRAVITY,
@@ -116,33 +130,66 @@ def _each(
     return [float(each) for each in values]
 
 
-def check_acceleration(path: Path, accelerometer: Accelerometer) -> None:
-    """See that a record can be read and holds an impact, before anything is computed. Raises CampaignError."""
+def check_acceleration(path: Path, accelerometer: Accelerometer) -> Accelerometer:
+    """See that a record can be read and holds an impact, before anything is computed.
+
+    Returns the accelerometer with the ranges that the file states where drop.toml states none. Raises CampaignError.
+    """
     try:
-        find_contact(read_acceleration(path, accelerometer), accelerometer, path)
+        found = _read(path, accelerometer)
+        ranges = [
+            stated if math.isinf(each.range) else each.range
+            for each, stated in zip(accelerometer.sensors, found.ranges, strict=True)
+        ]
+        order = sorted(range(len(ranges)), key=ranges.__getitem__)
+        sensors = tuple(replace(accelerometer.sensors[k], range=ranges[k]) for k in order)
+        accelerometer = replace(accelerometer, sensors=sensors)
+        found = Readings(found.time, found.values[:, order], tuple(found.ranges[k] for k in order))
+        find_contact(_select(path, accelerometer, found), accelerometer, path)
     except MeasurementError as trouble:
         raise CampaignError(trouble.where, trouble.key, trouble.message) from None
+    return accelerometer
 
 
 def read_acceleration(path: Path, accelerometer: Accelerometer) -> Acceleration:
     """The samples, each from the finest sensor that is within its range. Raises MeasurementError."""
-    names = [accelerometer.time_column, *(sensor.column for sensor in accelerometer.sensors)]
-    table = _read_columns(path, names)
-    time, readings = table[:, 0], table[:, 1:] * accelerometer.unit
+    return _select(path, accelerometer, _read(path, accelerometer))
+
+
+def _read(path: Path, accelerometer: Accelerometer) -> Readings:
+    formats = list_modules(__name__, "labsim.acceleration_formats")
+    claimed = (m for m in formats.values() if path.suffix.lower() in getattr(m, "SUFFIXES", ()))
+    found: Readings = next(claimed, formats["table"]).read(path, accelerometer)
+    if found.time.size < FEWEST:
+        raise MeasurementError(
+            path, "record.file", f"has {found.time.size} samples; an impact takes {FEWEST} or more"
+        )
+    largest = float(np.nanmax(np.abs(found.values), initial=0.0)) / accelerometer.unit
+    if max(largest, float(np.abs(found.time).max())) > LARGEST:
+        raise MeasurementError(
+            path, "record.file", f"holds numbers beyond {LARGEST:g}; they are no seconds and no g"
+        )
+    return found
+
+
+def _select(path: Path, accelerometer: Accelerometer, found: Readings) -> Acceleration:
+    time, readings = found.time, found.values
+    clock = accelerometer.time_column or "time"
     steps = np.diff(time)
     if not np.all(steps > 0):
         at = int(np.argmin(steps > 0))
         raise MeasurementError(
             path,
-            accelerometer.time_column,
+            clock,
             f"does not rise after {time[at]:g} s; keep one record, sorted by its time",
         )
     step = float(np.median(steps))
     if not SHORT <= step <= LONG:
         raise MeasurementError(
             path,
-            accelerometer.time_column,
-            f"has a sample every {step:g} s, outside {SHORT:g} to {LONG:g}; the column is in seconds",
+            clock,
+            f"has a sample every {step:g} s, outside {SHORT:g} to {LONG:g}; "
+            + ("the column is in seconds" if accelerometer.time_column else "name a sensor that samples so"),
         )
     sensor = np.full(time.size, -1)
     felt = np.full(time.size, math.nan)
@@ -162,21 +209,6 @@ def read_acceleration(path: Path, accelerometer: Accelerometer) -> Acceleration:
     return Acceleration(time[use], felt[use], sigma[sensor[use]], sensor[use], step, int(beyond.sum()), lost)
 
 
-def _read_columns(path: Path, names: list[str]) -> FloatArray:
-    """(rows, names); an empty cell is NaN, but not that of the time."""
-    lines, rows = read_named_columns(path, names)
-    for number, time in zip(lines, rows[:, 0], strict=True):
-        if not math.isfinite(time):
-            raise MeasurementError(path, f"line {number}", "holds no time; correct or remove the line")
-    if len(rows) < FEWEST:
-        raise MeasurementError(
-            path, "record.file", f"has {len(rows)} samples; an impact takes {FEWEST} or more"
-        )
-    if float(np.nanmax(np.abs(rows[:, 1:]), initial=0.0)) > 1e9 or float(np.abs(rows[:, 0]).max()) > 1e9:
-        raise MeasurementError(path, "record.file", "holds numbers beyond 1e9; they are no seconds and no g")
-    return rows
-
-
 def find_contact(record: Acceleration, accelerometer: Accelerometer, path: Path) -> int:
     """Number of the first sample of the impact: from there on, to the largest, the projectile feels more than noise.
 
@@ -187,10 +219,11 @@ def find_contact(record: Acceleration, accelerometer: Accelerometer, path: Path)
     peak = int(np.argmax(felt))
     least = float(np.min(felt))
     if -least > felt[peak]:
+        turned = "" if accelerometer.time_column else f': write "{_turn(sensor.column)}"'
         raise MeasurementError(
             path,
             sensor.column,
-            f"is largest downwards ({least / STANDARD_GRAVITY:.3g} g): an impact reads upwards; turn its sign",
+            f"is largest downwards ({least / STANDARD_GRAVITY:.3g} g): an impact reads upwards; turn its sign{turned}",
         )
     floor = SEEN * sigma + max(each.offset_sigma for each in accelerometer.sensors)
     if felt[peak] < 2 * STANDARD_GRAVITY or felt[peak] < 3 * floor[peak]:
@@ -211,6 +244,11 @@ def find_contact(record: Acceleration, accelerometer: Accelerometer, path: Path)
             "record begin earlier, or correct reads_at_rest and unit",
         )
     return int(np.nonzero(spell)[0][-1]) + 3
+
+
+def _turn(column: str) -> str:
+    """A sensor's name with the other sign, of a file whose numbers nobody edits."""
+    return column[1:] if column.startswith("-") else f"-{column}"
 
 
 def find_impact(record: Acceleration, drop: Drop) -> Impact:
