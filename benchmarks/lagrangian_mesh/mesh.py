@@ -23,6 +23,10 @@ class Dust:
     tensile_factor: float = 1.0
     solid: float = 2000.0
     gas_pressure: float = 0.0  # of the gas that the pores hold and keep
+    eta: float = 0.0  # Σ (1 + eta rate^rate_n) while dust is compacted at a rate (1/s), and Y with it
+    rate_n: float = 1.0
+    crust: tuple[float, float] = (0.0, 1.0)  # Δφ, ℓ (m): φ + Δφ exp(-depth/ℓ)
+    gradient: float = 0.0  # dφ/dz downwards, 1/m
 
     @property
     def law(self) -> np.ndarray:
@@ -31,9 +35,13 @@ class Dust:
             [
                 self.p_m, self.phi_1, self.phi_2, self.delta * np.log(10.0), self.bulk_modulus,
                 self.shear_to_bulk, self.shear_factor, self.tensile_factor, self.solid,
-                self.gas_pressure, self.filling_factor,
+                self.gas_pressure, self.filling_factor, self.eta, self.rate_n,
             ]
         )  # fmt: skip
+
+    def fill(self, depth: np.ndarray) -> np.ndarray:
+        """φ before the drop at a depth, m."""
+        return self.filling_factor + self.crust[0] * np.exp(-depth / self.crust[1]) + self.gradient * depth
 
 
 @dataclass(frozen=True)
@@ -91,14 +99,15 @@ def lay_mesh(r: np.ndarray, z: np.ndarray, dust: Dust, gravity: float) -> np.nda
     across_r, across_z = r[:-1, 1:] - r[1:, :-1], z[:-1, 1:] - z[1:, :-1]
     other_r, other_z = r[1:, 1:] - r[:-1, :-1], z[1:, 1:] - z[:-1, :-1]
     cells[..., quadrilateral.VOLUME] = mean(r) * 0.5 * (across_r * other_z - other_r * across_z)
-    phi = dust.filling_factor
+    phi = dust.fill(-mean(z))
     cells[..., quadrilateral.PHI] = phi
     cells[..., quadrilateral.MASS] = phi * dust.solid * cells[..., quadrilateral.VOLUME]
-    crush, _ = quadrilateral.find_strengths(phi, dust.law)
+    crush = np.vectorize(lambda each: quadrilateral.find_strengths(each, dust.law)[0])(phi)
     pressure = np.minimum(-phi * dust.solid * gravity * mean(z), 0.999 * crush)
     cells[..., quadrilateral.PRESSURE] = pressure
     cells[..., quadrilateral.PHI0] = [
-        [quadrilateral.find_unstressed(phi, p, dust.bulk_modulus) for p in row] for row in pressure
+        [quadrilateral.find_unstressed(f, p, dust.bulk_modulus) for f, p in zip(*rows, strict=True)]
+        for rows in zip(phi, pressure, strict=True)
     ]
     return cells
 
@@ -129,8 +138,10 @@ def run_drop(
     mass: float | None = None,
     sphere: bool = False,
     gravity: float = 9.81,
+    side: float = 0.0,
 ) -> Result:
-    """Run one drop to its stop; mass (kg) is that of a glass bead by default. RuntimeError where the mesh tangles."""
+    """Run one drop to its stop; mass (kg) is that of a glass bead by default, side (N/m) a force per immersed length that holds
+    the rod back. RuntimeError where the mesh tangles."""
     mass = BEAD_DENSITY * 4 / 3 * np.pi * radius**3 if mass is None else mass
     h = radius / numerics.cells
     edges_r = grade(numerics.even * radius, numerics.width * radius, h, numerics.growth)
@@ -139,7 +150,7 @@ def run_drop(
     cells = lay_mesh(r, z, dust, gravity)
     elastic = find_elastic_energy(cells, dust)
     curve = np.zeros((400_000, 4))
-    body = np.array([radius, mass / (2 * np.pi), speed, float(sphere)])
+    body = np.array([radius, mass / (2 * np.pi), speed, float(sphere), side / (2 * np.pi)])
     damping = np.array([numerics.linear, numerics.quadratic, numerics.hourglass])
     steps, spent = quadrilateral.advance(
         r, z, cells, dust.law, damping, body, gravity, numerics.courant, 60.0 * radius, curve
@@ -165,6 +176,7 @@ def run_drop(
         "viscous": 2 * np.pi * spent[1],
         "hourglass": 2 * np.pi * spent[2],
         "contact": 2 * np.pi * spent[3],
+        "side": 2 * np.pi * spent[6],
     }
     brought, gained, *left = energies.values()
     return Result(

@@ -56,6 +56,7 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
     spent : (3,), added to. Returns the shortest time (s) in which sound crosses a cell, or -1 where a cell has turned over.
     """
     k0, shear_to_bulk, shear_factor, solid, gas, phi_start = law[4], law[5], law[6], law[8], law[9], law[10]
+    eta, rate_n = law[11], law[12]
     linear, quadratic, hourglass = damping
     force_r[:] = 0.0
     force_z[:] = 0.0
@@ -90,6 +91,8 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
             div = lrr + lzz + hoop
             # pressure
             compressive, tensile = find_strengths(phi, law)
+            if eta > 0.0 and div < 0.0:
+                compressive *= 1.0 + eta * (-div) ** rate_n
             phi0 = cell[PHI0]
             elastic = k0 * (phi0 / REFERENCE) ** 4 * (phi / phi0 - 1.0)
             pressure = max(min(elastic, compressive), -tensile)
@@ -166,12 +169,13 @@ def find_surface(r, z, tip, radius, sphere):
 def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
     """Run from contact to the first v = 0 (or ``end``, s). The top row of nodes may not enter the projectile.
 
-    body : radius, mass per radian, speed downwards, 1 for a sphere or 0 for the end of a rod
+    body : radius, mass per radian, speed downwards, 1 for a sphere or 0 for the end of a rod, side force per immersed length
+    and radian
     curve : (k, 4) time, height of the tip, its velocity, force on it per radian, a row a step
-    Returns steps (negative where a cell turned over), energies (6,) per radian: stress work, viscous, hourglass, contact,
-    kinetic of the dust, potential energy it gained.
+    Returns steps (negative where a cell turned over), energies (7,) per radian: stress work, viscous, hourglass, contact,
+    kinetic of the dust, potential energy it gained, work of the side force.
     """
-    radius, mass, speed, sphere = body[0], body[1], body[2], body[3] > 0.5
+    radius, mass, speed, sphere, side = body[0], body[1], body[2], body[3] > 0.5, body[4]
     shape = r.shape
     u, v, force_r, force_z = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     nodes = np.zeros(shape)
@@ -183,7 +187,7 @@ def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
             nodes[i, j + 1] += quarter
             nodes[i + 1, j + 1] += quarter
     last, floor = shape[0] - 1, shape[1] - 1
-    spent, energies = np.zeros(3), np.zeros(6)
+    spent, energies = np.zeros(3), np.zeros(7)
     crossing = load_nodes(r, z, u, v, 0.0, cells, law, damping, force_r, force_z, spent)
     tip, falling, time, steps = 0.0, -speed, 0.0, 0
     curve[0] = 0.0, 0.0, -speed, 0.0
@@ -211,8 +215,10 @@ def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
                 r[i, j] += dt * u_new
                 z[i, j] += dt * v_new
                 u[i, j], v[i, j] = u_new, v_new
-        slowed = falling + push / mass - gravity * dt
+        held = side * max(-tip, 0.0) * dt
+        slowed = falling + (push + held) / mass - gravity * dt
         energies[3] -= node_work + 0.5 * push * (falling + slowed)
+        energies[6] -= 0.5 * held * (falling + slowed)
         tip += dt * slowed
         falling = slowed
         time += dt

@@ -165,7 +165,8 @@ def run_drop(
     end = 60e-3 * body.radius / 1e-3
     interval = 5e-6 * body.radius / 0.5e-3
     written, steps, stopping_time, stopping_depth = step.advance(
-        points, h, -layers * h, shape, *tables, law, body_of, forces, numerics.courant, end, stop_factor, curve, interval, numerics.own
+        points, h, -layers * h, shape, *tables, law, body_of, forces, numerics.courant, end, stop_factor,
+        curve, interval, numerics.own,
     )  # fmt: skip
     curve = curve[:written]
     at_end = np.column_stack(

@@ -1,10 +1,9 @@
-"""Make labelled campaigns with the material-point solver: 15 drops as tracks and two CT scans, or six drops felt by a sensor.
+"""Make labelled campaigns with the material-point solver: 15 drops as tracks and two CT scans each.
 
     python benchmarks/material_points/make_campaigns.py OUT [--plan PLAN.toml] [--only c01,c02] [--workers 1]
 
 Writes OUT/c01, OUT/c02, … (campaign folders, format 1) and OUT/truth.json; a folder appears when it is complete, and a
-second call makes what is missing. The plan says what is hidden in each (plan.toml beside this file; acceleration.toml for those
-whose projectiles carry an accelerometer, ``record = "acceleration"``).
+second call makes what is missing. The plan says what is hidden in each (plan.toml beside this file).
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 from drop import GRAVITY, Body, Dust, Numerics, extrapolate_drop, run_drop
-from feel import SCALE_SIGMA, Sensing, write_felt
 from film import HEIGHT_SIGMA, Filming, film, write_drop
 from scan import write_scan
 
@@ -39,14 +37,6 @@ SERIES = (
     *((LARGE, 1.0, speed, 10.7e-3) for speed in (0.20, 0.40, 0.40, 0.70)),
     (LARGE, 2.5, 0.30, 16.3e-3),
 )
-# radius, mass over a bead's, nominal speed, where an accelerometer takes the place of the camera and nothing is scanned
-FELT = (
-    *((0.75e-3, 1.0, speed) for speed in (0.35, 0.80)),
-    (0.75e-3, 2.5, 0.50),
-    *((1.5e-3, 1.0, speed) for speed in (0.25, 0.60)),
-    (1.5e-3, 2.5, 0.35),
-)
-RATES, NOISES = (2e3, 50e3), (0.001, 0.02)  # Hz; over the peak: drawn between, evenly in the logarithm
 SCANS = (0.75, 0.37)  # m/s
 REST = 2.0  # of the stopping time: a bead is scanned after it has come to rest, some of its depth above the deepest point
 
@@ -106,18 +96,13 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     folder.mkdir(parents=True)
     p_m, scatter = float(hidden["pm"]), hidden.get("scatter", SCATTER)
     measure = hidden.get("measure", {})
-    felt = hidden.get("record") == "acceleration"
-    series = [(*each, 0.0) for each in FELT] if felt else SERIES
-    if felt:
-        rate, noise = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in (RATES, NOISES))
-        sensing = Sensing(rate, noise, 1.0 + SCALE_SIGMA * rng.normal())
-    sequence = rng.permutation(len(series)) + 1
+    sequence = rng.permutation(len(SERIES)) + 1
     drops = {}
-    for k, (radius, heavier, nominal, after) in enumerate(series):
+    for k, (radius, heavier, nominal, after) in enumerate(SERIES):
         mass = BEAD * radius**3 * heavier
         speed = nominal * rng.uniform(0.94, 1.06)
         own = p_m * (1.0 + scatter * rng.normal())
-        own *= 1.0 + hidden.get("drift", 0.0) * ((sequence[k] - 1) / (len(series) - 1) - 0.5)
+        own *= 1.0 + hidden.get("drift", 0.0) * ((sequence[k] - 1) / (len(SERIES) - 1) - 0.5)
         if radius < 1e-3:
             own *= hidden.get("small_strength", 1.0)
         body = body_of(hidden, radius, mass * measure.get("mass", 1.0))
@@ -130,12 +115,6 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
             "true_stopping_time": result.stopping_time,
             "p_m": float(own),
         }
-        if felt:
-            write_felt(
-                folder / "drops" / label, result, sensing, rng,
-                radius=radius, mass=mass, sequence=int(sequence[k]), speed=speed,
-            )  # fmt: skip
-            continue
         filming = Filming(
             frame_rate=10000.0 if radius < 1e-3 else 5000.0,
             pixel_size=20e-6 if radius < 1e-3 else 40e-6,
@@ -153,7 +132,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
         )  # fmt: skip
     scans = {}
     ct = hidden.get("ct", {})
-    for k, nominal in enumerate(() if felt else SCANS):
+    for k, nominal in enumerate(SCANS):
         speed = nominal * rng.uniform(0.94, 1.06)
         own = p_m * (1.0 + scatter * rng.normal()) * hidden.get("small_strength", 1.0)
         mass = BEAD * SMALL**3

@@ -1,4 +1,4 @@
-"""Record a drop with an accelerometer on the projectile: samples with noise, a zero and a scale that are off, a clock of its own."""
+"""Record a drop with an accelerometer on the projectile: samples with noise, and a zero and a scale that are off."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from drop import GRAVITY, Result
-from scipy.interpolate import LSQUnivariateSpline
+from mesh import Result
 
 REST = 20e-3  # s on the record before release
 AFTER = 1.0  # stopping times on the record after the stop
 OFFSET_SIGMA, SCALE_SIGMA = 0.05, 0.01  # g; relative
-KNOTS = 12  # of the speed up to the stop
+GRAVITY = 9.81  # m/s^2
 SPEED_SIGMA = 0.005  # relative, as stated
 
 
@@ -26,33 +25,20 @@ class Sensing:
     scale: float
 
 
-def smooth_speed(result: Result, clock: np.ndarray) -> np.ndarray:
-    """Speed (m/s) at ``clock`` (s from contact): at rest, free fall, the dust, at rest again.
-
-    A run's force is rough by 4 % of its peak over a fortieth of the stop, as points cross cells; dust is not. So a cubic spline
-    is laid through the speed from contact to the stop, and another after it, for the force breaks off there.
-    """
-    stop, fall = result.stopping_time, float(result.speed[0] - GRAVITY * result.time[0])
-    inside = (result.time > 0.0) & (result.time < stop)
-    times = np.concatenate([[0.0], result.time[inside], [stop]])
-    speeds = np.concatenate([[fall], result.speed[inside], [0.0]])
-    weights = np.ones_like(times)
-    weights[[0, -1]] = 100.0
-    knots = np.linspace(0.0, stop, KNOTS + 1)[1:-1]
-    into = LSQUnivariateSpline(times, speeds, knots, w=weights)
-    late = result.time >= stop
-    rebound = float(result.speed[late].min()) if late.any() else 0.0
-    back = rebound * np.sin(np.pi * np.clip((clock - stop) / (0.2 * stop), 0.0, 1.0))
+def speed_at(result: Result, clock: np.ndarray) -> np.ndarray:
+    """Speed (m/s) at ``clock`` (s from contact): at rest, free fall, the dust, at rest again."""
+    fall = float(result.speed[0])
     free = np.where(clock < -fall / GRAVITY, 0.0, fall + GRAVITY * clock)
-    return np.where(clock < 0.0, free, np.where(clock < stop, into(np.clip(clock, 0.0, stop)), back))
+    inside = np.interp(clock, result.time, result.speed, right=0.0)
+    return np.where(clock < 0.0, free, np.where(clock < result.stopping_time, inside, 0.0))
 
 
 def feel(result: Result, sensing: Sensing, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
-    """Times (s) and readings (g, upwards, 1 at rest) of the samples, and the noise of one. A sample is the mean over its interval."""
-    fall = float(result.speed[0] - GRAVITY * result.time[0])
+    """Times (s) and readings (g, upwards, 1 at rest) of the samples, means over their intervals, and the noise of one."""
+    fall = float(result.speed[0])
     contact = REST + fall / GRAVITY + rng.uniform(0.0, 1.0 / sensing.rate)
     edges = np.arange(0.0, contact + (1.0 + AFTER) * result.stopping_time, 1.0 / sensing.rate)
-    speed = smooth_speed(result, edges - contact)
+    speed = speed_at(result, edges - contact)
     felt = 1.0 - np.diff(speed) * sensing.rate / GRAVITY
     sigma = sensing.noise * float(felt.max())
     felt = sensing.scale * felt + OFFSET_SIGMA * rng.normal() + sigma * rng.normal(size=felt.size)
