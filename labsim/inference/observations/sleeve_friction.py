@@ -36,9 +36,10 @@ FEWEST = 4  # records, and windows that they share, which say it
 
 @dataclass(frozen=True)
 class Spread:
-    """How ratios differ, relative. records : from record to record; profile : with depth, in all records alike; rest : from
-    window to window."""
+    """How ratios differ, relative to their middle, ``level``. records : from record to record; profile : with depth, in all
+    records alike; rest : from window to window."""
 
+    level: float
     records: float
     profile: float
     rest: float
@@ -55,13 +56,15 @@ def measure_spread(pushes: Sequence[ObservedPush]) -> Spread:
     """How ratios differ, from the windows that all records have: means of rows and columns, and what they leave."""
     numbers = [set(map(int, push.windows[np.isfinite(push.friction_ratio)])) for push in pushes]
     common = sorted(set.intersection(*numbers))
+    level = float(np.nanmedian(np.concatenate([push.friction_ratio for push in pushes])))
     if len(pushes) < FEWEST or len(common) < FEWEST:
-        return Spread(USUAL, USUAL, USUAL)
+        return Spread(level, USUAL, USUAL, USUAL)
     ratio = np.array([[push.friction_ratio[list(push.windows).index(n)] for n in common] for push in pushes])
-    ratio /= np.mean(ratio)  # no logarithm: a gauge's zero can take a ratio below nought
-    left = ratio - ratio.mean(axis=1, keepdims=True) - ratio.mean(axis=0) + 1.0
+    ratio /= level  # no logarithm: a gauge's zero can take a ratio below nought
+    left = ratio - ratio.mean(axis=1, keepdims=True) - ratio.mean(axis=0) + ratio.mean()
     own = left.size / ((len(pushes) - 1) * (len(common) - 1))
     return Spread(
+        level,
         float(np.std(ratio.mean(axis=1), ddof=1)),
         float(np.std(ratio.mean(axis=0), ddof=1)),
         float(math.sqrt(np.mean(left**2) * own)),
@@ -122,18 +125,19 @@ class TipSleeves:
         tangents = {"ln_p_m": move(1e-2, nominal) / 1e-2}
         for name, point in probes.items():
             tangents[name] = move(0.0, point) / point.step
-        size = np.abs(ratio)
+        # the same size in all of them: where errors go with single data, low ones would count for more
+        size = np.full(ratio.size, abs(self.spread.level))
         offset = gauge.offset_sigma / gauge.per_pressure(math.pi * radius**2)
         spread = self.spread
         shared = {
             # a smooth shaft has no friction in any simulation, so its error is a share of what is simulated
             "solver": SOLVER * here,
-            "sleeve gauge": gauge.sleeve.scale_sigma * ratio,
-            "gauge": -gauge.scale_sigma * ratio,
+            "sleeve gauge": gauge.sleeve.scale_sigma * size,
+            "gauge": -gauge.scale_sigma * size,
         }
         for number, at in zip(push.windows[seen], np.eye(int(seen.sum())), strict=True):
             shared[f"profile {number} of {radius:g}"] = spread.profile * size * at
-        own = [gauge.sleeve.offset_sigma / net, -offset * ratio / net, spread.records * size]
+        own = [gauge.sleeve.offset_sigma / net, -offset * size / net, spread.records * size]
         own.append(tangents["ln_p_m"] * terms.scatter)
         white = push.friction_sigma[seen] ** 2 + (spread.rest * size) ** 2
         return SleevePart(ratio - here, white, tangents, shared, np.stack(own, axis=1))
@@ -158,6 +162,12 @@ class SleeveFriction:
     @cached_property
     def _rows(self) -> tuple[tuple[TipSleeves, ObservedPush], ...]:
         return tuple((sleeve, push) for sleeve in self.sleeves for push in sleeve.pushes)
+
+    @property
+    def data(self) -> FloatArray:
+        """All measured ratios, in the order of the block's residual."""
+        found = [push.friction_ratio for _, push in self._rows]
+        return np.concatenate([ratio[np.isfinite(ratio)] for ratio in found])
 
     def begin(self) -> FloatArray:
         return np.empty(0)
