@@ -1,9 +1,11 @@
 """The friction ratio of a simulated push, sleeve friction over the tip's resistance: what spacing and length of the push change.
 
-A cone of 30° half angle on its shaft, in clay (law von_mises) without a stress at rest, as labsim compares soundings with it.
-Printed: R_f = (R / L) W_shaft / W_tip, that over the contact friction, and the tip's resistance in cohesions.
+A cone of 30° half angle on its shaft, without a stress at rest, as labsim compares soundings with it: in clay (von_mises), in
+snow (drucker_prager_cap with cohesion and cap) or in porous_dust, which know no --rigidity, --end and --width.
+Printed: R_f = (R / L) W_shaft / W_tip, that over the contact friction, and the tip's resistance.
 
     python benchmarks/sleeve.py [--cells 4 5 8 11] [--friction 0.2] [--rigidity 100] [--end 8 11.5] [--width 10]
+    python benchmarks/sleeve.py --law drucker_prager_cap
 
 A push from 4 to 11.5 tip radii leaves a shaft as long as the sleeve of a standard cone.
 """
@@ -15,11 +17,29 @@ import itertools
 import math
 
 import numpy as np
-from cone_factor import START, push_cone
-from flat_punch import COHESION, RADIUS
+from cone_factor import push_cone
+from flat_punch import RADIUS
 
+from labsim.inference.grid import hasten, set_push
 from labsim.inference.observations.push_model import encode_push
 from labsim.inference.observations.sleeve_friction import encode_sleeve
+from labsim.records import Material, Projectile
+from labsim.sph import DropRun, DropSetting, simulate
+
+SNOW = (("friction_angle", 35.0), ("cohesion", 1e3), ("cap_pressure", 2e4))
+
+
+def push_in_law(law: str, cells: int, friction: float) -> DropRun:
+    """From 4 to 8 tip radii, in snow or dust."""
+    constants = SNOW if law == "drucker_prager_cap" else ()
+    setting = DropSetting(
+        projectile=Projectile("cone", RADIUS, 1e-6),
+        impact_speed=1.0,
+        material=Material(law=law, constants=constants, contact_friction=friction),
+        filling_factor=0.2,
+        spacing=RADIUS / cells,
+    )
+    return simulate(hasten(set_push(setting, 1e-3)))
 
 
 def main() -> None:
@@ -27,6 +47,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--cells", type=int, nargs="+", default=[4, 5, 8, 11], help="in a tip radius")
+    parser.add_argument(
+        "--law", choices=("von_mises", "drucker_prager_cap", "porous_dust"), default="von_mises"
+    )
     parser.add_argument("--friction", type=float, nargs="+", default=[0.2])
     parser.add_argument("--rigidity", type=float, nargs="+", default=[100.0])
     parser.add_argument("--end", type=float, nargs="+", default=[8.0], help="of the push, tip radii")
@@ -37,14 +60,17 @@ def main() -> None:
     for rigidity, friction, end, cells in itertools.product(
         given.rigidity, given.friction, given.end, given.cells
     ):
-        run = push_cone(cells, rigidity, given.speed, 0.0, given.width, end, friction)
+        if given.law == "von_mises":
+            run = push_cone(cells, rigidity, given.speed, 0.0, given.width, end, friction)
+        else:
+            run = push_in_law(given.law, cells, friction)
         ratio = float(encode_sleeve(run)[0])
         found.append(ratio / friction)
-        factor = math.exp(float(encode_push(run, whole=False)[0])) / COHESION
+        resistance = math.exp(float(encode_push(run, whole=False)[0]))
         print(
-            f"R/dx {cells}, to {end:g} radii ({(end - START) * RADIUS * 1e3:.3g} mm of way), rigidity {rigidity:g}, "
-            f"friction {friction:g}: R_f {100 * ratio:.2f} %, over the friction {ratio / friction:.3f}, "
-            f"tip {factor:.2f} cohesions; energy {run.energy_error:+.1%}, {run.wall:.0f} s",
+            f"{given.law}, R/dx {cells}, to {end:g} radii, rigidity {rigidity:g}, friction {friction:g}: R_f {100 * ratio:.2f} %"
+            f", over the friction {ratio / friction:.3f}, tip {resistance / 1e3:.3g} kPa; energy {run.energy_error:+.1%}, "
+            f"{run.wall:.0f} s",
             flush=True,
         )
     if len(found) > 1:
