@@ -11,6 +11,7 @@ import pytest
 
 from labsim.calibrated import set_value
 from labsim.campaign import read_campaign
+from labsim.errors import InferenceError
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import Fit, fit_hypothesis
 from labsim.inference.grid import hasten, set_nominal_drop, set_push
@@ -25,7 +26,8 @@ from labsim.inference.observations.sleeve_friction import (
 from labsim.inference.observe_push import ObservedPush
 from labsim.inference.run_parts import Push
 from labsim.inference.runs import RunStore
-from labsim.records import Campaign, Sleeve
+from labsim.inference.supported import refuse_others
+from labsim.records import Campaign, Material, Sleeve
 from labsim.sph import simulate
 
 TILLER = Path(__file__).resolve().parents[2] / "data/campaigns/tiller"
@@ -138,6 +140,12 @@ def write_campaign(folder: Path, sleeve: bool, resistance: float, ratio: float) 
         (drop / "push.csv").write_text("z_m,q_kPa,f_kPa\n" + rows + "\n")
         (drop / "drop.toml").write_text(KEYS.format(sequence=k + 1, sleeve=str(sleeve).lower()))
     return read_campaign(folder)
+
+
+def test_a_sleeve_in_a_law_whose_shaft_depends_on_the_spacing_is_refused() -> None:
+    campaign, _ = choose(Sleeve(sigma=300.0, compared=True))
+    with pytest.raises(InferenceError, match="not with porous_dust .*write sleeve = false"):
+        refuse_others(replace(campaign, material=Material(), p_m_range=(500.0, 5000.0)))
 
 
 def test_a_hidden_contact_friction_is_found_with_a_sleeve_alone(tmp_path: Path, shared_store: str) -> None:
