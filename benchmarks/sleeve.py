@@ -1,13 +1,13 @@
 """The friction ratio of a simulated push, sleeve friction over the tip's resistance: what spacing and length of the push change.
 
 A cone of 30° half angle on its shaft, without a stress at rest, as labsim compares soundings with it: in clay (von_mises), in
-snow (drucker_prager_cap with cohesion and cap) or in porous_dust, which know no --rigidity, --end and --width.
+snow (drucker_prager_cap with cohesion and cap) or in porous_dust, which know no --rigidity, --start, --end and --width.
 Printed: R_f = (R / L) W_shaft / W_tip, that over the contact friction, and the tip's resistance.
 
-    python benchmarks/sleeve.py [--cells 4 5 8 11] [--friction 0.2] [--rigidity 100] [--end 8 11.5] [--width 10]
-    python benchmarks/sleeve.py --law drucker_prager_cap
+    python benchmarks/sleeve.py [--cells 4 5 8 11] [--friction 0.2] [--rigidity 100] [--start 4] [--end 8 11.5] [--width 10]
+    python benchmarks/sleeve.py --law porous_dust
 
-A push from 4 to 11.5 tip radii leaves a shaft as long as the sleeve of a standard cone.
+A push from 12 to 19.5 tip radii leaves a shaft as long as the sleeve of a standard cone.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import itertools
 import math
 
 import numpy as np
-from cone_factor import push_cone
+from cone_factor import START, push_cone
 from flat_punch import RADIUS
 
 from labsim.inference.grid import hasten, set_push
@@ -52,6 +52,7 @@ def main() -> None:
     )
     parser.add_argument("--friction", type=float, nargs="+", default=[0.2])
     parser.add_argument("--rigidity", type=float, nargs="+", default=[100.0])
+    parser.add_argument("--start", type=float, default=START, help="of the push, tip radii")
     parser.add_argument("--end", type=float, nargs="+", default=[8.0], help="of the push, tip radii")
     parser.add_argument("--speed", type=float, default=0.5)
     parser.add_argument("--width", type=float, default=10.0, help="half width of the ground, tip radii")
@@ -61,15 +62,15 @@ def main() -> None:
         given.rigidity, given.friction, given.end, given.cells
     ):
         if given.law == "von_mises":
-            run = push_cone(cells, rigidity, given.speed, 0.0, given.width, end, friction)
+            run = push_cone(cells, rigidity, given.speed, 0.0, given.width, end, friction, given.start)
         else:
             run = push_in_law(given.law, cells, friction)
         ratio = float(encode_sleeve(run)[0])
         found.append(ratio / friction)
         resistance = math.exp(float(encode_push(run, whole=False)[0]))
         print(
-            f"{given.law}, R/dx {cells}, to {end:g} radii, rigidity {rigidity:g}, friction {friction:g}: R_f {100 * ratio:.2f} %"
-            f", over the friction {ratio / friction:.3f}, tip {resistance / 1e3:.3g} kPa; energy {run.energy_error:+.1%}, "
+            f"{given.law}, R/dx {cells}, from {given.start:g} to {end:g} radii, rigidity {rigidity:g}, friction {friction:g}: "
+            f"R_f {100 * ratio:.2f} %, over the friction {ratio / friction:.3f}, tip {resistance / 1e3:.3g} kPa; energy {run.energy_error:+.1%}, "
             f"{run.wall:.0f} s",
             flush=True,
         )

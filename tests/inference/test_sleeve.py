@@ -144,7 +144,7 @@ def write_campaign(folder: Path, sleeve: bool, resistance: float, ratio: float) 
 
 def test_a_sleeve_in_a_law_whose_shaft_depends_on_the_spacing_is_refused() -> None:
     campaign, _ = choose(Sleeve(sigma=300.0, compared=True))
-    with pytest.raises(InferenceError, match="not with porous_dust .*write sleeve = false"):
+    with pytest.raises(InferenceError, match=r"not with porous_dust .*write sleeve = false"):
         refuse_others(replace(campaign, material=Material(), p_m_range=(500.0, 5000.0)))
 
 
