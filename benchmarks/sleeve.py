@@ -70,7 +70,8 @@ def main() -> None:
         resistance = math.exp(float(encode_push(run, whole=False)[0]))
         print(
             f"{given.law}, R/dx {cells}, from {given.start:g} to {end:g} radii, rigidity {rigidity:g}, friction {friction:g}: "
-            f"R_f {100 * ratio:.2f} %, over the friction {ratio / friction:.3f}, tip {resistance / 1e3:.3g} kPa; energy {run.energy_error:+.1%}, "
+            f"R_f {100 * ratio:.2f} %, over the friction {ratio / friction:.3f}, tip {resistance / 1e3:.3g} kPa; "
+            f"energy {run.energy_error:+.1%}, "
             f"{run.wall:.0f} s",
             flush=True,
         )
