@@ -137,8 +137,12 @@ class TipSleeves:
         }
         for number, at in zip(push.windows[seen], np.eye(int(seen.sum())), strict=True):
             shared[f"profile {number} of {radius:g}"] = spread.profile * size * at
-        own = [gauge.sleeve.offset_sigma / net, -offset * size / net, spread.records * size]
-        own.append(tangents["ln_p_m"] * terms.scatter)
+        own = (
+            gauge.sleeve.offset_sigma / net,
+            -offset * size / net,
+            spread.records * size,
+            tangents["ln_p_m"] * terms.scatter,
+        )
         white = push.friction_sigma[seen] ** 2 + (spread.rest * size) ** 2
         return SleevePart(ratio - here, white, tangents, shared, np.stack(own, axis=1))
 
