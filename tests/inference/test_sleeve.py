@@ -27,6 +27,7 @@ from labsim.inference.observe_push import ObservedPush
 from labsim.inference.run_parts import Push
 from labsim.inference.runs import RunStore
 from labsim.inference.supported import refuse_others
+from labsim.inspection.drops import inspect_drop
 from labsim.records import Campaign, Material, Sleeve
 from labsim.sph import simulate
 
@@ -140,6 +141,14 @@ def write_campaign(folder: Path, sleeve: bool, resistance: float, ratio: float) 
         (drop / "push.csv").write_text("z_m,q_kPa,f_kPa\n" + rows + "\n")
         (drop / "drop.toml").write_text(KEYS.format(sequence=k + 1, sleeve=str(sleeve).lower()))
     return read_campaign(folder)
+
+
+def test_check_shows_the_ratio_whether_it_counts_or_not() -> None:
+    for sleeve, words in ((SHOWN, "not compared"), (Sleeve(sigma=300.0, compared=True), "compared")):
+        campaign, _ = choose(sleeve)
+        found = inspect_drop(campaign.drops[0], campaign)
+        assert found.line.endswith(f" % of the net resistance, {words}") and not found.odd
+        assert 0.004 < found.numbers["friction_ratio"] < 0.012
 
 
 def test_a_sleeve_in_a_law_whose_shaft_depends_on_the_spacing_is_refused() -> None:
