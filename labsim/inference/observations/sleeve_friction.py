@@ -27,11 +27,10 @@ from ..run_parts import Push
 from . import RunFeatures
 from .drop_terms import Probe, Terms
 
-SOLVER = (
-    0.20  # of the simulated ratio: spacing and a shaft that is shorter than a sleeve (benchmarks/sleeve.py)
-)
+SOLVER = 0.20  # of the simulated ratio: spacing, a shaft shorter than a sleeve (benchmarks/sleeve.py)
 USUAL = 0.10  # of the ratio, along the depth and from record to record: where too few records say it
 FEWEST = 4  # records, and windows that they share, which say it
+LEAST = 1e-4  # ratio that errors are shares of where a gauge's zero hides all of it
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,8 @@ def measure_spread(pushes: Sequence[ObservedPush]) -> Spread:
     """How ratios differ, from the windows that all records have: means of rows and columns, and what they leave."""
     numbers = [set(map(int, push.windows[np.isfinite(push.friction_ratio)])) for push in pushes]
     common = sorted(set.intersection(*numbers))
-    level = float(np.nanmedian(np.concatenate([push.friction_ratio for push in pushes])))
+    middle = float(np.nanmedian(np.concatenate([push.friction_ratio for push in pushes])))
+    level = max(abs(middle), LEAST)
     if len(pushes) < FEWEST or len(common) < FEWEST:
         return Spread(level, USUAL, USUAL, USUAL)
     ratio = np.array([[push.friction_ratio[list(push.windows).index(n)] for n in common] for push in pushes])
@@ -126,7 +126,7 @@ class TipSleeves:
         for name, point in probes.items():
             tangents[name] = move(0.0, point) / point.step
         # the same size in all of them: where errors go with single data, low ones would count for more
-        size = np.full(ratio.size, abs(self.spread.level))
+        size = np.full(ratio.size, self.spread.level)
         offset = gauge.offset_sigma / gauge.per_pressure(math.pi * radius**2)
         spread = self.spread
         shared = {
