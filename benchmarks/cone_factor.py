@@ -28,8 +28,9 @@ def push_cone(
     width: float = 10.0,
     end: float = 9.0,
     friction: float = 0.0,
+    start: float = START,
 ) -> DropRun:
-    """From START to end tip radii; the cone begins in the ground. speed m/s; radius of the point, half width in tip radii;
+    """From start to end tip radii; the cone begins in the ground. speed m/s; radius of the point, half width in tip radii;
     coefficient of Coulomb friction, rough where it is large: matter at the cone then yields before it slides."""
     shear = rigidity * COHESION
     law = (("cohesion", COHESION), ("shear_modulus", shear), ("bulk_modulus", 10 * shear))
@@ -43,7 +44,7 @@ def push_cone(
             spacing=RADIUS / cells,
             width=width * RADIUS,
             depth=(end + 5.0) * RADIUS,
-            motion=Motion("pushed", START * RADIUS, (("speed", speed), ("end_depth", end * RADIUS))),
+            motion=Motion("pushed", start * RADIUS, (("speed", speed), ("end_depth", end * RADIUS))),
         )
     )
 

@@ -151,6 +151,19 @@ class Accelerometer:
 
 
 @dataclass(frozen=True)
+class Sleeve:
+    """The friction sleeve behind a pushed tip. column : of a table, "" where the format has its own; unit : Pa of one of its
+    numbers; sigma (of a row), offset_sigma : Pa; scale_sigma : relative; compared : whether it counts, or is shown alone."""
+
+    column: str = ""
+    unit: float = 1e3
+    sigma: float = 0.0
+    offset_sigma: float = 0.0
+    scale_sigma: float = 0.0
+    compared: bool = False
+
+
+@dataclass(frozen=True)
 class Gauge:
     """What logs a push. depth_column, column : of a table, "" where the format has its own; unit, depth_unit : SI of one of their
     numbers; sigma (of a row), offset_sigma : SI, N of a force, else Pa; scale_sigma : relative; window : m, what is compared;
@@ -166,6 +179,7 @@ class Gauge:
     scale_sigma: float
     window: tuple[float, float]
     surface: float = 0.0
+    sleeve: Sleeve = Sleeve()
 
     def per_pressure(self, section: float) -> float:
         """What a number of the gauge is divided by to become Pa on a tip's section (m²)."""

@@ -13,7 +13,7 @@ import pytest
 
 from labsim.campaign import read_campaign, read_drop
 from labsim.errors import CampaignError, LabsimError, MeasurementError
-from labsim.force import read_force, read_gauge
+from labsim.force import check_force, read_force, read_gauge
 from labsim.inference.observe_push import observe_push
 from labsim.inspection.drops import find_air
 from labsim.tables import Table
@@ -127,6 +127,48 @@ def test_a_row_without_pore_water_is_lost_not_corrected_by_nothing(tmp_path: Pat
     lines += [f"D={0.02 * k:.3f},QC=1.0" + (f",U={300.0}" if k % 3 else "") for k in range(60)]
     record = read_force(write(tmp_path / "s.cpt", "\n".join(lines)), gauge(force_unit="MPa"), RADIUS)
     assert record.lost == 20 and np.ptp(record.pressure) == 0.0
+
+
+PRESSED = {"depth_column": "z", "pressure_column": "q", "depth_unit": "cm", "force_unit": "kPa"}
+
+
+def write_sleeve(path: Path) -> Path:
+    lines = ["z,q,f", *(f"{0.5 * k:.1f},{100 + k:.1f},{'' if k == 7 else 2 + 0.01 * k:}" for k in range(200))]
+    return write(path, "\n".join(lines) + "\n")
+
+
+def test_a_sleeve_is_a_column_in_its_unit(tmp_path: Path) -> None:
+    path = write_sleeve(tmp_path / "p.csv")
+    keys = {**PRESSED, "sleeve_column": "f", "sleeve": True, "sleeve_sigma": 0.1, "sleeve_offset_sigma": 0.5}
+    known = gauge(**keys)
+    record = read_force(path, known, RADIUS)
+    assert record.sleeve[100] == pytest.approx(3e3) and np.isnan(record.sleeve[7]) and record.lost == 0
+    assert (known.sleeve.sigma, known.sleeve.offset_sigma, known.sleeve.compared) == (100.0, 500.0, True)
+    assert not read_force(path, gauge(**PRESSED), RADIUS).sleeve.size
+    assert read_force(path, gauge(**keys, sleeve_unit="MPa"), RADIUS).sleeve[100] == pytest.approx(3e6)
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({**PRESSED, "sleeve": True, "sleeve_sigma": 0.1}, "no sleeve_column is there"),
+        ({**PRESSED, "sleeve_column": "f", "sleeve": True}, "sleeve_sigma: is missing"),
+        ({**PRESSED, "sleeve": "yes"}, "neither true nor false"),
+        ({**PRESSED, "sleeve_column": "f", "sleeve_unit": "bar"}, "write one of"),
+        ({**NAMED, "sleeve_column": "f"}, "needs pressure_column"),
+        ({**NAMED, "sleeve": True, "sleeve_sigma": 0.1}, "holds the shaft too"),
+    ],
+)
+def test_what_is_wrong_with_a_sleeve_is_named(keys: dict, text: str) -> None:
+    with pytest.raises(CampaignError, match=text):
+        gauge(**keys)
+
+
+def test_a_sleeve_that_counts_must_be_in_the_record(tmp_path: Path) -> None:
+    lines = ["HA=1,MA=0.8", *(f"D={0.02 * k:.3f},QC=1.0,U=100.0" for k in range(60))]
+    path = write(tmp_path / "s.cpt", "\n".join(lines))
+    with pytest.raises(CampaignError, match="no sleeve friction"):
+        check_force(path, gauge(force_unit="MPa", sleeve=True, sleeve_sigma=0.3), RADIUS)
 
 
 @pytest.mark.parametrize(

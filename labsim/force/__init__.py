@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import CampaignError, MeasurementError
 from ..extensions import list_modules
-from ..records import FloatArray, Gauge
+from ..records import FloatArray, Gauge, Sleeve
 from ..tables import Table
 
 DEPTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -107,6 +107,41 @@ def read_gauge(table: Table) -> Gauge:
         scale_sigma=table.number("scale_sigma", 0.0, 0.5, default=0.0),
         window=(0.0, math.inf) if window is None else (window[0] * 1e-3, window[1] * 1e-3),
         surface=1e-3 * table.number("surface_mm", -1e5, 1e5, default=0.0),
+        sleeve=_read_sleeve(table),
+    )
+
+
+def _read_sleeve(table: Table) -> Sleeve:
+    """The keys that say what the friction sleeve's gauge is. Raises CampaignError."""
+    column, compared = table.text("sleeve_column", ""), table.get("sleeve", False)
+    if not isinstance(compared, bool):
+        raise table.wrong("sleeve", f"{compared!r} is neither true nor false; write true where it counts")
+    if column and not table.has("pressure_column"):
+        raise table.wrong(
+            "sleeve_column",
+            "needs pressure_column: a sleeve is compared with what the tip alone meets, a force holds the shaft too",
+        )
+    if compared and table.has("force_column"):
+        raise table.wrong(
+            "sleeve", "is true for a force, which holds the shaft too; give pressure_column or write false"
+        )
+    if compared and table.has("pressure_column") and not column:
+        raise table.wrong("sleeve", "is true, but no sleeve_column is there; name the column of the table")
+    unit = PRESSURE_UNITS[table.choice("sleeve_unit", tuple(PRESSURE_UNITS), "kPa")]
+    top = LARGEST / unit
+    # a ratio without an error would count without bound, so whoever lets it count states the noise
+    sigma = (
+        table.number("sleeve_sigma", 0.0, top, unit=unit)
+        if compared
+        else table.number("sleeve_sigma", 0.0, top, unit=unit, default=0.0)
+    )
+    return Sleeve(
+        column,
+        unit,
+        sigma,
+        table.number("sleeve_offset_sigma", 0.0, top, unit=unit, default=0.0),
+        table.number("sleeve_scale_sigma", 0.0, 0.5, default=0.0),
+        compared,
     )
 
 
@@ -175,6 +210,10 @@ def check_force(path: Path, gauge: Gauge, radius: float) -> None:
             path,
             gauge.column or "record.file",
             f"is {np.median(record.pressure):.3g} Pa in the middle: what resists a push is positive; turn its sign",
+        )
+    if gauge.sleeve.compared and not record.sleeve.size:
+        raise CampaignError(
+            path, "record.sleeve", "is true, but the record has no sleeve friction; write false, or export it"
         )
 
 

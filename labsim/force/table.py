@@ -15,5 +15,8 @@ def read(path: Path, gauge: Gauge, section: float) -> Columns:
     for key, name in (("depth_column", gauge.depth_column), ("force_column", gauge.column)):
         if not name:
             raise MeasurementError(path, f"record.{key}", "is missing; name the column of the table")
-    _, rows = read_named_columns(path, [gauge.depth_column, gauge.column])
-    return Columns(rows[:, 0] * gauge.depth_unit, rows[:, 1] * gauge.unit / gauge.per_pressure(section))
+    sleeve = gauge.sleeve
+    names = [gauge.depth_column, gauge.column, *([sleeve.column] if sleeve.column else [])]
+    _, rows = read_named_columns(path, names)
+    depth, pressure = rows[:, 0] * gauge.depth_unit, rows[:, 1] * gauge.unit / gauge.per_pressure(section)
+    return Columns(depth, pressure, rows[:, 2] * sleeve.unit) if sleeve.column else Columns(depth, pressure)

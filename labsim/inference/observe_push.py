@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import helmert
@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from ..errors import MeasurementError
 from ..force import ForceRecord, read_force
-from ..records import Campaign, Drop, FloatArray, Measured
+from ..records import Campaign, Drop, FloatArray, Gauge, Measured
 
 WINDOW = 56.0  # tip radii; clays are felt over some 10 to 30 (Lunne, Robertson & Powell 1997)
 DEEP = 10.0  # tip radii, from which on a push is deep: its resistance no longer depends on the surface
@@ -29,7 +29,9 @@ ROUGH = 0.003  # of ln resistance: what a median over a window is good to, at be
 @dataclass(frozen=True)
 class ObservedPush:
     """One record in windows. depth : (n,) m, middle of each; windows : (n,) their numbers, the same for all records of a tip;
-    resistance, sigma : (n,) ln of net resistance over 1 Pa, and its own error; speeds : m/s as stated."""
+    resistance, sigma : (n,) ln of net resistance over 1 Pa, and its own error; speeds : m/s as stated; friction_ratio,
+    friction_sigma : (n,) of the sleeve over the net resistance, and its own error, NaN where too few rows have a sleeve, empty
+    where the record has none."""
 
     drop: Drop
     record: ForceRecord
@@ -42,6 +44,14 @@ class ObservedPush:
     rejected: int
     warnings: tuple[str, ...] = ()
     curve: None = None
+    friction_ratio: FloatArray = field(default_factory=lambda: np.empty(0))
+    friction_sigma: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def compares_sleeve(self) -> bool:
+        """Whether its sleeve counts, and says something."""
+        assert self.drop.gauge is not None
+        return self.drop.gauge.sleeve.compared and bool(np.isfinite(self.friction_ratio).any())
 
     @property
     def name(self) -> str:
@@ -100,6 +110,7 @@ def observe_push(drop: Drop, campaign: Campaign) -> ObservedPush:
             "resists more than the weight of the ground; record deeper, or correct unit and density",
         )
     dropped = len(whole) - len(kept)
+    ratio, ratio_sigma = _read_sleeve(drop.gauge, record, net, number, kept, noise)
     return ObservedPush(
         drop,
         record,
@@ -111,7 +122,27 @@ def observe_push(drop: Drop, campaign: Campaign) -> ObservedPush:
         (Measured(dict(drop.motion.values)["speed"], drop.motion.speed_sigma),),
         record.lost + record.lifted,
         (f"{dropped} windows without a net resistance are left out",) * bool(dropped),
+        friction_ratio=ratio,
+        friction_sigma=ratio_sigma,
     )
+
+
+def _read_sleeve(
+    gauge: Gauge, record: ForceRecord, net: FloatArray, number: np.ndarray, kept: Sequence[int], noise: float
+) -> tuple[FloatArray, FloatArray]:
+    """Median of sleeve friction over net resistance in each window, and its own error; empty where the record has no sleeve."""
+    if not record.sleeve.size:
+        return np.empty(0), np.empty(0)
+    values, errors = np.full((2, len(kept)), math.nan)
+    for k, n in enumerate(kept):
+        inside = (number == n) & np.isfinite(record.sleeve) & (net > 0.0)
+        if inside.sum() < FEWEST:
+            continue
+        values[k] = np.median(record.sleeve[inside] / net[inside])
+        # relative errors of the resistance are those of the ratio; its own rows scatter by the sleeve's noise
+        own = math.hypot(gauge.sleeve.sigma, values[k] * noise) / float(np.median(net[inside]))
+        errors[k] = math.hypot(ROUGH * values[k], own / math.sqrt(inside.sum()))
+    return values, errors
 
 
 def measure_ground(pushes: Sequence[ObservedPush]) -> Ground:

@@ -23,6 +23,7 @@ from .observations.compacted_zone import CompactedZone, CompactedZones, Observed
 from .observations.drop_model import make_drop_model
 from .observations.drop_terms import RecordModel, Terms
 from .observations.push_model import PushModel, encode_push
+from .observations.sleeve_friction import SleeveFriction, TipSleeves, encode_sleeve, measure_spread
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
 from .observe import Observed, observe_drops
@@ -62,6 +63,7 @@ def open_workbench(
     models: list[RecordModel] = []
     features: list[RunFeatures] = []
     of_speeds: list[RunFeatures] = []
+    sleeves: list[TipSleeves] = []
     dropped = [drop for drop in drops if not isinstance(drop, ObservedPush)]
     pushed = [drop for drop in drops if isinstance(drop, ObservedPush)]
     of_tips = [push for push in pushed if not push.feels_shaft]
@@ -84,6 +86,10 @@ def open_workbench(
             features.append(RunFeatures(len(families), table, encode))
             families.append(Family(projectile, nodes, False, few, pushed=True))
             models += [PushModel(push, table, ground, reference) for push in pushes]
+            with_sleeve = [push for push in pushes if push.compares_sleeve]
+            if with_sleeve:
+                ratios = RunFeatures(len(families) - 1, ResponseTable(np.log(nodes), few), encode_sleeve)
+                sleeves.append(TipSleeves(tuple(with_sleeve), ratios, measure_spread(with_sleeve)))
             continue
         features.append(RunFeatures(len(families), table, encode_run))
         families.append(Family(projectile, nodes, False, few))
@@ -98,6 +104,8 @@ def open_workbench(
             if not isinstance(drop, ObservedPush)
         ]
     observations.append(Tracks(tuple(models), (*features, *of_speeds), name="drops" if dropped else "pushes"))
+    if sleeves:
+        observations.append(SleeveFriction(tuple(sleeves)))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
         nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)

@@ -12,6 +12,8 @@ from ..records import Campaign, Motion
 from .grid import strength_node
 from .nodes import enclosing_nodes
 
+# laws whose friction ratio keeps to observations.sleeve_friction.SOLVER where the spacing is refined (benchmarks/sleeve.py)
+SHAFTS = ("von_mises",)
 INSTEAD = "labsim simulate --campaign CAMPAIGN --drop NAME simulates it"
 
 
@@ -40,6 +42,13 @@ def refuse_others(campaign: Campaign) -> None:
                 f'scans and static tests are compared with "{DUST}" only; take them out of the campaign',
             )
     for drop in campaign.drops:
+        if drop.gauge is not None and drop.gauge.sleeve.compared and law not in SHAFTS:
+            raise InferenceError(
+                campaign.folder / "drops" / drop.name / "drop.toml",
+                "record.sleeve",
+                f"is true, but what a shaft feels is simulated well enough with {', '.join(SHAFTS)} alone, not with "
+                f"{Path(law).stem} (docs/force-records.md); write sleeve = false",
+            )
         if drop.record.kind == "force" and Path(drop.motion.kind).stem == "pushed":
             continue
         if drop.motion != Motion():

@@ -108,6 +108,16 @@ def _inspect_push(drop: Drop, campaign: Campaign) -> Found:
         },
     )
     found.odd += seen.warnings
+    ratios = seen.friction_ratio[np.isfinite(seen.friction_ratio)]
+    if ratios.size:
+        ratio, friction = float(np.median(ratios)), float(np.nanmedian(record.sleeve))
+        use = "compared" if drop.gauge.sleeve.compared else "not compared"
+        found.line += f"; sleeve {friction / 1e3:.3g} kPa, {100 * ratio:.2g} % of the net resistance, {use}"
+        found.numbers |= {"sleeve_median_Pa": friction, "friction_ratio": ratio}
+        if ratio <= 0.0:
+            found.odd.append(
+                f"the sleeve reads {friction / 1e3:.3g} kPa in the middle: friction is positive; correct its zero or sign"
+            )
     if record.lost:
         found.odd.append(f"{record.lost} rows have no number")
     if record.lifted > LIFTED_SHARE * record.depth.size:

@@ -20,6 +20,7 @@ from ..diagnosis.next_experiment import Suggestion
 from ..inference.calibrate import Calibration
 from ..inference.fitting import DOUBTFUL, Fit
 from ..inference.observations.push_model import PushModel
+from ..inference.observations.sleeve_friction import SOLVER, SleeveFriction
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .campaign_figures import COLOURS, draw_causes, draw_held_out, draw_p_m
@@ -199,6 +200,28 @@ def write_push_calibration(found: Calibration, folder: Path) -> Path:
     return _write(found, views, folder, tiles, "none" if explains else "unknown", badge, sentence)
 
 
+def say_sleeve(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> str:
+    """What the sleeves read beside what each named fit simulates; empty where no record has one."""
+    ratios = [model.observed.friction_ratio for model in bench.tracks.models if isinstance(model, PushModel)]
+    measured = np.concatenate(ratios) if ratios else np.empty(0)
+    measured = measured[np.isfinite(measured)]
+    if not measured.size:
+        return ""
+    text = (
+        f" The sleeve feels {100 * np.median(measured):.2g} % of the net resistance (median of all windows)"
+    )
+    place = next((k for k, each in enumerate(bench.observations) if isinstance(each, SleeveFriction)), None)
+    if place is None:
+        return text + "; that is shown alone, and compared where the record says sleeve = true."
+    sleeves = bench.observations[place]
+    assert isinstance(sleeves, SleeveFriction)
+    simulated = [
+        f"{100 * float(np.median(sleeves.data - fit.blocks[place].residual)):.2g} % ({label.replace('_', ' ')})"
+        for label, fit in fits
+    ]
+    return text + f"; simulated are {', '.join(simulated)}, to {100 * SOLVER:.0f} % of that."
+
+
 def _draw(found: Diagnosis | Calibration, fits: Sequence[tuple[str, Fit]], folder: Path) -> list[PushView]:
     views = view_pushes(found.bench, fits)
     draw_pushes(views, folder / "pushes.png")
@@ -228,7 +251,7 @@ def _write(
         f"what it says of the resistance, in units of {label}, holds at every depth. How the strength grows with depth is free: "
         "each window of depth has a value that all pushes share. Beside that each push may differ by a factor, "
         f"{100 * found.bench.terms.scatter:.2g} % from one to the next, and along its depth by {100 * ground.size:.2g} % over "
-        f"{ground.length:.2g} m, as these records show."
+        f"{ground.length:.2g} m, as these records show." + say_sleeve(found.bench, list_fits(found))
     )
     labels = list(views[0].left)
     rows = [

@@ -47,6 +47,38 @@ def test_a_block_that_slides_under_a_flat(friction):
     assert heat == pytest.approx(expected, rel=0.02)
 
 
+SETTLED = 0.07  # spacings by which dust in equilibrium at a wall is nearer than half a cell
+
+
+def push_rod_through_tube(friction: float) -> tuple[float, float, float]:
+    """Mean forces of 2 ms on a rod that moves down through a tube of elastic dust under uniform pressure, N a radian: by the work
+    booked on its shaft and by its impulse; and μ p A. Around the tube is a mirror, its ends are held."""
+    radius, columns, layers, pressure = 10 * SPACING, 16, 30, 0.02 * MODULUS
+    material = elastic_material(MODULUS, 0.5).replace(contact_friction=friction)
+    rod = Projectile("hemisphere", radius, 1e9)
+    setting = set_body(material, SPACING, 2e-3, geometry="axisymmetric").replace(projectile=rod)
+    x, z = np.meshgrid(np.arange(columns) + 0.5 - SETTLED, np.arange(layers) + 0.5)
+    x, z = radius + SPACING * x.ravel(), SPACING * z.ravel()
+    state = fill_at_rest(setting, x, z, np.full(x.size, setting.filling_factor), pressure)
+    held = (z < 3 * SPACING) | (z > (layers - 3) * SPACING)
+    body = np.array([-5 * radius, -SPEED, 0.0, 0.0, 0.0])
+    mirror = radius + (columns - SETTLED) * SPACING
+    log = evolve(setting, state, held, body, planes=(mirror,)).log
+    by_impulse = np.trapezoid(log[1:, 3], log[1:, 0]) / np.ptp(log[1:, 0])
+    return log[-1, 11] / np.ptp(log[:, 1]), by_impulse, friction * pressure * radius * layers * SPACING
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1, 0.2, 0.3])
+def test_a_shaft_under_uniform_pressure(friction):
+    """What a sleeve feels is μ p A, and all of it is booked as the shaft's."""
+    by_work, by_impulse, expected = push_rod_through_tube(friction)
+    print(
+        f"μ {friction}: by work {by_work:.4e}, by impulse {by_impulse:.4e}, μ p A {expected:.4e} N a radian"
+    )
+    assert by_work == pytest.approx(expected, rel=0.04, abs=1e-12)
+    assert by_impulse == pytest.approx(by_work, rel=0.01, abs=1e-12)
+
+
 @pytest.mark.parametrize("speed", [0.25, 0.65])
 def test_a_rough_drop_balances_its_book_at_the_full_step(speed):
     """Dust that sticks to the bead is not shaken: half the step gives the same depth, and no energy comes from nowhere."""
