@@ -8,7 +8,7 @@ polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.m
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import CubicSpline, PPoly, make_lsq_spline
 
 from ..records import FloatArray
 from ..sph import DropRun
@@ -17,6 +17,27 @@ from .run_parts import Motion
 FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)
 UNIT_SPLINES = np.ascontiguousarray(CubicSpline(FRACTIONS, np.eye(FRACTIONS.size)).c)
+PIECES = 4  # of the spline through the speed up to the stop
+
+
+def _smooth_to_the_stop() -> FloatArray:
+    """(n, n) from speeds at FRACTIONS to those of a cubic spline of PIECES pieces, fitted up to the stop and met at both ends.
+
+    The force of a run grows particle by particle; it is known over a quarter of the stop, not over a fortieth.
+    """
+    inside = FRACTIONS[FRACTIONS <= 1.0]
+    ends = np.repeat([0.0, 1.0], 4)
+    knots = np.sort(np.concatenate([ends, np.linspace(0.0, 1.0, PIECES + 1)[1:-1]]))
+    weights = np.ones(inside.size)
+    weights[[0, -1]] = 100.0
+    whole = np.eye(FRACTIONS.size)
+    whole[: inside.size, : inside.size] = make_lsq_spline(inside, np.eye(inside.size), knots, w=weights)(
+        inside
+    )
+    return whole
+
+
+SMOOTHED = _smooth_to_the_stop()
 
 
 def encode_run(run: DropRun | Motion) -> FloatArray:
@@ -27,10 +48,10 @@ def encode_run(run: DropRun | Motion) -> FloatArray:
 
 def encode_speeds(run: DropRun | Motion) -> FloatArray:
     """(2 + len(FRACTIONS),): ln D, ln T_s and the speeds of one run in D/T_s, whose differences are accelerations: the second
-    difference of stored depths would show the straight lines between them."""
+    difference of stored depths would show the straight lines between them. Smooth up to the stop: SMOOTHED."""
     speed = np.interp(FRACTIONS * run.stopping_time, run.time, run.velocity)
     depth, stop = run.penetration_depth, run.stopping_time
-    return np.concatenate([[np.log(depth), np.log(stop)], speed * stop / depth])
+    return np.concatenate([[np.log(depth), np.log(stop)], SMOOTHED @ speed * stop / depth])
 
 
 def decode_speed(code: FloatArray, time: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ from .tangents import Blocks, linearise_at
 from .workbench import Workbench
 
 Hypothesis = tuple[str, ...]
-ITERATIONS = 12
+ITERATIONS = 40  # records of acceleration, which are steep in the contact time, take some twenty
 # p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
 # looked for where that costs nothing; below the second it fails, and runs are made to find out why
 DOUBTFUL, REJECTED = 0.05, 0.01

@@ -32,6 +32,7 @@ COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than wha
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
+FELT_CELLS = 8  # of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration_error.py)
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
 
 Change = Callable[[DropSetting], DropSetting]
@@ -42,7 +43,7 @@ class Family:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
     few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change. pushed :
-    led through the ground at these speeds, not dropped.
+    led through the ground at these speeds, not dropped. felt : an accelerometer is on some of them.
     """
 
     projectile: Projectile
@@ -50,6 +51,7 @@ class Family:
     is_scan: bool
     few: tuple[int, ...]
     pushed: bool = False
+    felt: bool = False
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,8 @@ class RunGrid:
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
-        own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else cells or self.cells
+        usual = max(self.cells, FELT_CELLS) if family.felt else self.cells
+        own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else cells or usual
         setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
         if family.pushed:
             setting = set_push(setting, speed)

@@ -92,9 +92,10 @@ def open_workbench(
                 sleeves.append(TipSleeves(tuple(with_sleeve), ratios, measure_spread(with_sleeve)))
             continue
         features.append(RunFeatures(len(families), table, encode_run))
-        families.append(Family(projectile, nodes, False, few))
+        felt = any(isinstance(drop, ObservedImpact) for drop in group)
+        families.append(Family(projectile, nodes, False, few, felt=felt))
         speeds = ResponseTable(np.log(nodes), few)
-        if any(isinstance(drop, ObservedImpact) for drop in group):
+        if felt:
             of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
         models += [
             make_acceleration_model(drop, speeds)

@@ -14,6 +14,7 @@ from ..forward import Instant, ResponseTable, predict_depth, predict_speed
 from ..observe import ObservedDrop
 
 BIN = 8  # frames of free fall averaged into one point
+ALONG = 0.4  # of the stopping time, over which the solver's error of the depth changes
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
 SPEED_WIDTH = 0.05  # of ln speed, prior width
 LEAST_SURFACE = 1e-9  # m
@@ -127,11 +128,11 @@ class DropModel:
         """(n, 0): depths have none that is not smooth."""
         return np.zeros((here.size, 0))
 
-    def in_dust(
-        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument
-    ) -> FloatArray:
-        """What the solver is off by a share of, m."""
-        return np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0)
+    def find_solver_error(
+        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
+    ) -> tuple[FloatArray, float]:
+        """What the solver is off by in all such drops alike, m, and over which share of the stopping time that changes."""
+        return share * np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0), ALONG
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         """True times (s) of the data."""

@@ -15,7 +15,7 @@ from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph import DropSetting
 from ..forward import Instant
 from .acceleration_model import AccelerationModel
-from .drop_model import FREE, SPEED_WIDTH, DropModel
+from .drop_model import ALONG, FREE, SPEED_WIDTH, DropModel
 from .push_model import PushModel
 
 RecordModel = DropModel | AccelerationModel | PushModel  # of what one instrument records of one drop or push
@@ -65,7 +65,7 @@ class Probe(NamedTuple):
 @dataclass(frozen=True)
 class NumericalError:
     """The solver's error of one drop. size : (n,) m; fraction : (n,) of the time to the stop; drops are alike by reach (ln of
-    final depth over tip radius), radius and mass (logarithms)."""
+    final depth over tip radius), radius and mass (logarithms). length : over which share of the stopping time it changes."""
 
     size: FloatArray
     fraction: FloatArray
@@ -73,6 +73,7 @@ class NumericalError:
     radius: float
     mass: float
     unit: str = "m"
+    length: float = ALONG
 
 
 @dataclass(frozen=True)
@@ -159,15 +160,16 @@ def linearise_drop(
         "numerical strength": by_strength * terms.numerical_strength,
     }
 
-    reached = model.in_dust(here, clock, final, instrument)
+    off, length = model.find_solver_error(here, clock, final, instrument, terms.numerical)
     plain = here if code is response.plain else model.predict(response.plain, instrument, instant)
     numerical = NumericalError(
-        np.hypot(reached * terms.numerical, (here - plain) * terms.numerical_change),
+        np.hypot(off, (here - plain) * terms.numerical_change),
         np.clip(clock / stop, 0.0, 1.0),
         reach,
         math.log(model.radius),
         math.log(mass.mass / model.radius**3),
         model.unit,
+        length,
     )
     drop = DropTerms(
         model.data - here,

@@ -113,9 +113,9 @@ def _add_errors(parts: Sequence[DropTerms], sections: Sequence[slice]) -> FloatA
 def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
     """The solver's error of the depth: as large as terms.numerical of the depth reached, alike for alike drops."""
     size = np.concatenate([part.size for part in parts])
-    fraction = np.concatenate([part.fraction for part in parts])
+    fraction = np.concatenate([part.fraction / part.length for part in parts])
     counts = [part.size.size for part in parts]
-    distance = np.subtract.outer(fraction, fraction) / 0.4
+    distance = np.subtract.outer(fraction, fraction)
     distance *= distance
     apart = measure_distances([(part.reach, part.radius, part.mass) for part in parts])
     # a depth and an acceleration are not off alike
