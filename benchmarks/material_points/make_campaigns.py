@@ -8,27 +8,23 @@ second call makes what is missing. The plan says what is hidden in each (plan.to
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-import shutil
-import time
-import tomllib
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+import sys
 from pathlib import Path
 
 import numpy as np
-from drop import GRAVITY, Body, Dust, Numerics, extrapolate_drop, run_drop
+from drop import GRAVITY, SOLID, Body, Dust, Numerics, extrapolate_drop, run_drop
 from film import HEIGHT_SIGMA, Filming, film, write_drop
 from scan import write_scan
 
+sys.path.append(str(Path(__file__).parents[1]))
+import labelled
+from labelled import SMALL
+
 BEAD = 2540.0 * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
-SMALL, LARGE = 0.5e-3, 1.5e-3
+LARGE = 1.5e-3  # m
 NUMERICS = Numerics(cells=8.0)  # and half as many again, for the limit of no cell size
 # a map has no limit of two runs: one run whose projectile is felt a sixth of a cell around it, as deep as the limit to 0.6 %
 MAPPED = Numerics(cells=12.0, width=5.0, height=5.0, near=3.0, gap=0.17)
-SCATTER = 0.02  # of p_m from sample to sample, where the plan says no other
 FILLING = 0.150  # as stated
 # radius (m), mass over a bead's, nominal speed (m/s), film after contact (s)
 SERIES = (
@@ -42,8 +38,7 @@ REST = 2.0  # of the stopping time: a bead is scanned after it has come to rest,
 
 
 def dust_of(hidden: dict, p_m: float) -> Dust:
-    values = {key: tuple(v) if isinstance(v, list) else v for key, v in hidden.get("dust", {}).items()}
-    return Dust(p_m=p_m, **{"filling_factor": FILLING, **values})
+    return Dust(p_m=p_m, **{"filling_factor": FILLING, **labelled.set_dust(hidden)})
 
 
 def body_of(hidden: dict, radius: float, mass: float, sphere: bool = False) -> Body:
@@ -58,62 +53,38 @@ def body_of(hidden: dict, radius: float, mass: float, sphere: bool = False) -> B
     return Body(radius=radius, mass=mass, sphere=sphere, **terms)
 
 
-def name_hidden(hidden: dict) -> dict:
-    """What is hidden, in the words of the labelled campaigns' truth.json; words of its own where those have none."""
-    words = {"rate_n": "raten", "shear_factor": "yf", "gas_pressure": "pgas", "friction": "mu_f"}
-    dust = {words.get(key, key): value for key, value in hidden.get("dust", {}).items()}
-    profile = None
-    if "crust" in dust:
-        excess, length = dust.pop("crust")
-        profile = {"kind": "crust", "df": excess, "l": length}
-    elif "gradient" in dust:
-        profile = {"kind": "gradient", "slope": dust.pop("gradient")}
-    elif "layers" in dust:
-        amplitude, period = dust.pop("layers")
-        profile = {"kind": "layers", "df": amplitude, "period": period}
-    sample = {key: hidden[key] for key in ("small_strength",) if key in hidden}
-    return {
-        "cause": hidden["cause"],
-        "pm": float(hidden["pm"]),
-        "note": hidden.get("note", ""),
-        "seed": hidden["seed"],
-        "mat": dust,
-        "dyn": {words.get(key, key): value for key, value in hidden.get("body", {}).items()},
-        "measure": hidden.get("measure", {}),
-        "ct": hidden.get("ct", {}),
-        "drift": hidden.get("drift", 0.0),
-        "profile": profile,
-        **sample,
-    }
-
-
 def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     hidden, out = job
     name = hidden["name"]
-    rng = np.random.default_rng(hidden["seed"])
-    folder = out / f".{name}.part"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    p_m, scatter = float(hidden["pm"]), hidden.get("scatter", SCATTER)
+    with labelled.write_folder(out, name) as folder:
+        rng = np.random.default_rng(hidden["seed"])
+        drops = drop_rods(hidden, folder, rng)
+        scans = scan_beads(hidden, folder, rng)
+        description = "Drops of rods and glass beads into dust, by a material-point solver"
+        labelled.write_sample(folder, name, description, Dust(), FILLING, SOLID)
+    return name, {**labelled.name_hidden(hidden), "name": name, "drops": drops, "scans": scans}
+
+
+def drop_rods(hidden: dict, folder: Path, rng: np.random.Generator) -> dict:
+    """Fifteen films; the truth of each."""
     measure = hidden.get("measure", {})
     sequence = rng.permutation(len(SERIES)) + 1
     drops = {}
     for k, (radius, heavier, nominal, after) in enumerate(SERIES):
         mass = BEAD * radius**3 * heavier
         speed = nominal * rng.uniform(0.94, 1.06)
-        own = p_m * (1.0 + scatter * rng.normal())
-        own *= 1.0 + hidden.get("drift", 0.0) * ((sequence[k] - 1) / (len(SERIES) - 1) - 0.5)
+        own = labelled.draw_strength(hidden, rng.normal(), (int(sequence[k]) - 1) / (len(SERIES) - 1))
         if radius < 1e-3:
             own *= hidden.get("small_strength", 1.0)
         body = body_of(hidden, radius, mass * measure.get("mass", 1.0))
         result = extrapolate_drop(dust_of(hidden, own), body, speed, NUMERICS, stop_factor=1.12)
-        assert result.stopping_time > 0.0, f"{name} drop {k + 1} did not stop"
+        assert result.stopping_time > 0.0, f"{hidden['name']} drop {k + 1} did not stop"
         label = f"D{k + 1:02d}"
         drops[label] = {
             "true_v0": speed,
             "true_depth": result.stopping_depth,
             "true_stopping_time": result.stopping_time,
-            "p_m": float(own),
+            "p_m": own,
         }
         filming = Filming(
             frame_rate=10000.0 if radius < 1e-3 else 5000.0,
@@ -130,11 +101,16 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
             folder / "drops" / label, frames, rows, surface,
             radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5), filming=filming,
         )  # fmt: skip
+    return drops
+
+
+def scan_beads(hidden: dict, folder: Path, rng: np.random.Generator) -> dict:
+    """Two CT scans; the truth of each."""
+    measure, ct = hidden.get("measure", {}), hidden.get("ct", {})
     scans = {}
-    ct = hidden.get("ct", {})
     for k, nominal in enumerate(SCANS):
         speed = nominal * rng.uniform(0.94, 1.06)
-        own = p_m * (1.0 + scatter * rng.normal()) * hidden.get("small_strength", 1.0)
+        own = labelled.draw_strength(hidden, rng.normal()) * hidden.get("small_strength", 1.0)
         mass = BEAD * SMALL**3
         dust = dust_of(hidden, own)
         body = body_of(hidden, SMALL, mass * measure.get("mass", 1.0), sphere=True)
@@ -144,79 +120,8 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
             folder / "ct" / f"C{k + 1:02d}", result, dust, SMALL, mass, speed, SMALL / MAPPED.cells, rng,
             ct.get("scale", 1.0), blur,
         )  # fmt: skip
-    (folder / "campaign.toml").write_text(campaign_toml(name))
-    if (out / name).exists():
-        shutil.rmtree(out / name)
-    os.replace(folder, out / name)
-    return name, {
-        **name_hidden(hidden),
-        "name": name,
-        "drops": drops,
-        "scans": scans,
-    }
-
-
-def campaign_toml(name: str) -> str:
-    nominal = Dust()
-    return f"""format = 1
-name = "{name}"
-description = "Drops of rods and glass beads into dust, by a material-point solver"
-
-[sample]
-filling_factor = {FILLING:.3f}
-filling_factor_sigma = 0.001
-monomer_density_kg_m3 = 2000.0
-diameter_mm = 25.0
-depth_mm = 20.0
-gas_pressure_Pa = 10.0
-
-[material]          # nominal; p_m is what calibration finds
-p_m_range_Pa = [300.0, 6000.0]
-phi_1 = {nominal.phi_1}
-phi_2 = {nominal.phi_2}
-delta = {nominal.delta}
-tensile_log10_a = 2.8
-tensile_log10_b = 1.48
-shear_factor = 1.0          # Y = shear_factor * sqrt(Sigma |T|)
-bulk_modulus_Pa = {nominal.bulk_modulus:.1f}   # K(phi) = bulk_modulus * (phi/0.15)^gamma
-bulk_exponent = 4.0
-shear_to_bulk = {nominal.shear_to_bulk}         # mu = shear_to_bulk * K
-contact_friction = 0.0
-"""
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--plan", type=Path, default=Path(__file__).parent / "plan.toml")
-    parser.add_argument("--only", default="")
-    parser.add_argument("--workers", type=int, default=1)
-    arguments = parser.parse_args()
-    plan = tomllib.loads(arguments.plan.read_text())["campaign"]
-    for k, hidden in enumerate(plan):
-        hidden.setdefault("name", f"c{k + 1:02d}")
-    chosen = [h for h in plan if not arguments.only or h["name"] in arguments.only.split(",")]
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    truth_file = arguments.out / "truth.json"
-    truth = json.loads(truth_file.read_text()) if truth_file.exists() else {}
-    for h in chosen:
-        if h["name"] in truth:
-            truth[h["name"]].update(name_hidden(h))
-    jobs = [(h, arguments.out) for h in chosen if h["name"] not in truth]
-    began = time.perf_counter()
-    with ProcessPoolExecutor(arguments.workers, mp_context=get_context("spawn")) as pool:
-        for future in [pool.submit(make_campaign, job) for job in jobs]:
-            name, found = future.result()
-            truth[name] = found
-            partly = truth_file.with_suffix(".part")
-            partly.write_text(json.dumps(truth, indent=1))
-            os.replace(partly, truth_file)
-            print(
-                f"{name}: {found['cause']} ({found['note']}), {time.perf_counter() - began:.0f} s", flush=True
-            )
+    return scans
 
 
 if __name__ == "__main__":
-    main()
+    labelled.make_campaigns(make_campaign, __doc__, Path(__file__).parent / "plan.toml", "c")

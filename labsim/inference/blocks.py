@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
@@ -54,6 +56,45 @@ class Block:
         """Squared length of the whitened residual."""
         white = self.whiten(self.residual)
         return float(white @ white)
+
+
+class Part(Protocol):
+    """Data of one record about one point: a part of a Block."""
+
+    @property
+    def residual(self) -> FloatArray:
+        """(n,)"""
+
+    @property
+    def white(self) -> FloatArray:
+        """(n,) variances of errors that each datum has alone."""
+
+    @property
+    def local(self) -> FloatArray:
+        """(n, k) errors of this record alone, per standard uncertainty of each."""
+
+    @property
+    def shared(self) -> Mapping[str, FloatArray]:
+        """name -> (n,), errors with one value for all records that have the name, per standard uncertainty."""
+
+
+def lay_out(sizes: Iterable[int]) -> list[slice]:
+    """Where records of these sizes lie, one after the other."""
+    ends = np.cumsum([0, *sizes])
+    return [slice(int(begin), int(end)) for begin, end in pairwise(ends)]
+
+
+def add_errors(covariance: FloatArray, parts: Sequence[Part], sections: Sequence[slice]) -> None:
+    """Add to a covariance (n, n) what each record errs by alone, and what they share."""
+    for part, own in zip(parts, sections, strict=True):
+        covariance[own, own] += part.local @ part.local.T + np.diag(part.white)
+    shared = {name: None for part in parts for name in part.shared}
+    columns = np.zeros((len(covariance), len(shared)))
+    for k, name in enumerate(shared):
+        for part, own in zip(parts, sections, strict=True):
+            if name in part.shared:
+                columns[own, k] = part.shared[name]
+    covariance += columns @ columns.T
 
 
 def factorise(covariance: FloatArray) -> FloatArray:

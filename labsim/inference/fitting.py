@@ -23,9 +23,9 @@ from .tangents import Blocks, linearise_at
 from .workbench import Workbench
 
 Hypothesis = tuple[str, ...]
-ITERATIONS = 12
-# with steps that gain more than LOWER each: records of acceleration, steep in the contact time, take some twenty
-MOST_GAINING = 40
+# a fit has this many steps; beyond PATIENT each has to gain more than LOWER. Records of acceleration, steep in the contact time,
+# take some twenty
+ITERATIONS, PATIENT = 40, 12
 # p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
 # looked for where that costs nothing; below the second it fails, and runs are made to find out why
 DOUBTFUL, REJECTED = 0.05, 0.01
@@ -94,8 +94,7 @@ def fit_hypothesis(
     coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
     least : ln likelihood, priors included, of a start below which no step is taken.
-    iterations : most steps of the globals, but for those that still gain, of which there may be MOST_GAINING; with none they
-    stay, and the nuisances alone are moved to their best.
+    iterations : most steps of the globals; with none they stay, and the nuisances alone are moved to their best.
     """
     begin = tuple(each.begin() for each in bench.observations) if nuisances is None else nuisances.nuisances
     values = {name: hold(bench, name, start[1].get(name, 0.0)) for name in hypothesis}
@@ -103,7 +102,7 @@ def fit_hypothesis(
     best: Solved | None = None
     share, settled, calm = 1.0, False, False
     gain = math.inf
-    for iteration in range((MOST_GAINING if iterations >= ITERATIONS else iterations) + 1):
+    for iteration in range(iterations + 1):
         _ask(bench, hypothesis, place.log_p_m, place.values, coarse=coarse, around=around)
         there = solve_at(bench, place)
         if best is not None and there.height < best.height - LOWER:
@@ -121,7 +120,7 @@ def fit_hypothesis(
             break
         place, settled = advance(bench, best, share)
         settled = settled and iteration > 0
-        if iteration >= iterations and gain <= LOWER:
+        if iteration >= PATIENT and gain <= LOWER:
             break
     assert best is not None
     if not (settled or calm):

@@ -76,7 +76,17 @@ class Observation(Protocol):
         """
 
 
-class Direct(ABC):
+class WithoutNuisances:
+    """The part of an Observation that has nothing to follow."""
+
+    def begin(self) -> FloatArray:
+        return np.empty(0)
+
+    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
+        return nuisances, 0.0
+
+
+class Direct(WithoutNuisances, ABC):
     """An Observation whose data follow from the setting alone: no runs, no nuisances. A kind has ``kind`` and ``name``, and says
     what it expects and how its data compare with that."""
 
@@ -89,9 +99,6 @@ class Direct(ABC):
     @abstractmethod
     def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
         """The data with their errors about what is expected."""
-
-    def begin(self) -> FloatArray:
-        return np.empty(0)
 
     def linearise(
         self,
@@ -106,9 +113,6 @@ class Direct(ABC):
         for name, point in probes.items():
             tangents[name] = (self.expect(log_p_m, point) - here) / point.step
         return self.compare(here, tangents, terms)
-
-    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
-        return nuisances, 0.0
 
 
 def list_own_files(folder: Path) -> list[Path]:

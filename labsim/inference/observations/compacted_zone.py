@@ -22,7 +22,7 @@ from ...ct.reduce import ReducedScan
 from ...effects import Instrument
 from ...records import FillingMap, FloatArray, Scan
 from ...sph import DropRun
-from ..blocks import Block
+from ..blocks import Block, lay_out
 from ..forward import ResponseTable
 from ..run_parts import Compaction
 from . import RunFeatures
@@ -271,13 +271,10 @@ class CompactedZones:
             zone.linearise(float(log_speed), log_p_m, nominal, terms, probes)
             for zone, log_speed in zip(self.zones, nuisances, strict=True)
         ]
-        ends = np.cumsum([part.residual.size for part in parts])
-        sections = [
-            slice(int(end) - part.residual.size, int(end)) for part, end in zip(parts, ends, strict=True)
-        ]
+        sections = lay_out(part.residual.size for part in parts)
         own = np.concatenate([np.full(part.residual.size, k) for k, part in enumerate(parts)])
         cells = np.ones(own.size, dtype=bool)
-        cells[ends - 1] = False
+        cells[[section.stop - 1 for section in sections]] = False
         alike = self._find_alike(parts)[np.ix_(own, own)]
         contrast = np.concatenate([part.contrast for part in parts])
         covariance = np.zeros(alike.shape)

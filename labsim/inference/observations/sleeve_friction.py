@@ -21,10 +21,10 @@ import numpy as np
 from ...effects import Instrument
 from ...records import FloatArray
 from ...sph import DropRun
-from ..blocks import Block
+from ..blocks import Block, add_errors, lay_out
 from ..observe_push import ObservedPush
 from ..run_parts import Push
-from . import RunFeatures
+from . import RunFeatures, WithoutNuisances
 from .drop_terms import Probe, Terms
 
 SOLVER = 0.20  # of the simulated ratio: spacing, a shaft shorter than a sleeve (benchmarks/sleeve.py)
@@ -74,13 +74,13 @@ def measure_spread(pushes: Sequence[ObservedPush]) -> Spread:
 @dataclass(frozen=True)
 class SleevePart:
     """One record about one point. residual, white (variance) : (n,); tangents : name -> (n,); shared : name -> (n,), errors with
-    one value for several records, per standard uncertainty; own : (n, k) those of this record alone."""
+    one value for several records, per standard uncertainty; local : (n, k) those of this record alone."""
 
     residual: FloatArray
     white: FloatArray
     tangents: Mapping[str, FloatArray]
     shared: Mapping[str, FloatArray]
-    own: FloatArray
+    local: FloatArray
 
 
 @dataclass(frozen=True)
@@ -137,18 +137,18 @@ class TipSleeves:
         }
         for number, at in zip(push.windows[seen], np.eye(int(seen.sum())), strict=True):
             shared[f"profile {number} of {radius:g}"] = spread.profile * size * at
-        own = (
+        local = (
             gauge.sleeve.offset_sigma / net,
             -offset * size / net,
             spread.records * size,
             tangents["ln_p_m"] * terms.scatter,
         )
         white = push.friction_sigma[seen] ** 2 + (spread.rest * size) ** 2
-        return SleevePart(ratio - here, white, tangents, shared, np.stack(own, axis=1))
+        return SleevePart(ratio - here, white, tangents, shared, np.stack(local, axis=1))
 
 
 @dataclass(frozen=True)
-class SleeveFriction:
+class SleeveFriction(WithoutNuisances):
     """All sleeves that are compared, an Observation without nuisances: a ratio hardly depends on the speed of a push.
 
     Scale and zero of the tip's gauge, which it shares with the resistance, count as errors of its own: they are small beside
@@ -173,9 +173,6 @@ class SleeveFriction:
         found = [push.friction_ratio for _, push in self._rows]
         return np.concatenate([ratio[np.isfinite(ratio)] for ratio in found])
 
-    def begin(self) -> FloatArray:
-        return np.empty(0)
-
     def linearise(
         self,
         nuisances: FloatArray,
@@ -185,24 +182,10 @@ class SleeveFriction:
         probes: Mapping[str, Probe],
     ) -> Block:
         parts = [sleeve.linearise(push, log_p_m, nominal, terms, probes) for sleeve, push in self._rows]
-        ends = np.cumsum([part.residual.size for part in parts])
-        places = [
-            slice(int(end) - part.residual.size, int(end)) for part, end in zip(parts, ends, strict=True)
-        ]
-        covariance = np.diag(np.concatenate([part.white for part in parts]))
-        names = {
-            name: k for k, name in enumerate(dict.fromkeys(name for part in parts for name in part.shared))
-        }
-        columns = np.zeros((len(covariance), len(names)))
-        for part, place in zip(parts, places, strict=True):
-            covariance[place, place] += part.own @ part.own.T
-            for name, column in part.shared.items():
-                columns[place, names[name]] = column
+        covariance = np.zeros((self.data.size, self.data.size))
+        add_errors(covariance, parts, lay_out(part.residual.size for part in parts))
         return Block(
             np.concatenate([part.residual for part in parts]),
-            covariance + columns @ columns.T,
+            covariance,
             {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
         )
-
-    def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
-        return nuisances, 0.0

@@ -17,12 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...records import FloatArray
-from ..blocks import Block
+from ..blocks import Block, add_errors, lay_out
 from ..forward import Instant
 from . import RunFeatures
 from .drop_model import WIDTHS
 from .drop_terms import (
-    DropTerms,
     NumericalError,
     Probe,
     RecordModel,
@@ -70,14 +69,13 @@ class Tracks:
             linearise_drop(model, instant, log_p_m, nominal, terms, probes)
             for model, instant in zip(self.models, self.instants(nuisances), strict=True)
         ]
-        ends = np.cumsum([part.residual.size for part in parts])
-        sections = {
-            model.observed.name: slice(int(end) - part.residual.size, int(end))
-            for model, part, end in zip(self.models, parts, ends, strict=True)
-        }
+        places = lay_out(part.residual.size for part in parts)
+        sections = {model.observed.name: place for model, place in zip(self.models, places, strict=True)}
+        covariance = numerical_covariance([part.numerical for part in parts])
+        add_errors(covariance, parts, places)
         return DropsBlock(
             np.concatenate([part.residual for part in parts]),
-            _add_errors(parts, list(sections.values())),
+            covariance,
             {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
             sections=sections,
             local=tuple(part.local for part in parts),
@@ -93,21 +91,6 @@ class Tracks:
             moved.append(after)
             moves.append(move)
         return np.array(moved), max(moves)
-
-
-def _add_errors(parts: Sequence[DropTerms], sections: Sequence[slice]) -> FloatArray:
-    """Covariance (n, n) of all drops: each one's own, what they share, the solver's."""
-    covariance = numerical_covariance([part.numerical for part in parts])
-    for part, own in zip(parts, sections, strict=True):
-        covariance[own, own] += part.local @ part.local.T + np.diag(part.white)
-    shared = {name: None for part in parts for name in part.shared}
-    columns = np.zeros((len(covariance), len(shared)))
-    for k, name in enumerate(shared):
-        for part, own in zip(parts, sections, strict=True):
-            if name in part.shared:
-                columns[own, k] = part.shared[name]
-    covariance += columns @ columns.T
-    return covariance
 
 
 def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
