@@ -60,11 +60,11 @@ class Body:
 @dataclass(frozen=True)
 class Numerics:
     cells: float = 8.0  # a/h
-    courant: float = 0.5
-    own: float = 0.98  # of its velocity beyond the grid's, kept by a point
-    width: float = 4.0  # of the domain, radii
-    height: float = 3.0  # of dust below ``reach``, radii
-    near: float = 2.2  # radii from the axis and from ``reach`` within which a cell holds per_cell² points
+    courant: float = 0.35
+    own: float = 0.0  # of its velocity beyond the grid's, kept by a point
+    width: float = 5.0  # of the domain, radii
+    height: float = 4.0  # of dust below ``reach``, radii
+    near: float = 3.0  # radii from the axis and from ``reach`` within which a cell holds per_cell² points
     per_cell: int = 2  # points a cell and direction
     start: float = 1.5  # cells above the surface where the tip starts
     raised: float = 0.0  # cells by which the dust's surface lies above its nominal height
@@ -184,7 +184,7 @@ def extrapolate_drop(
     dust: Dust,
     body: Body,
     speed: float,
-    numerics: Numerics = Numerics(),
+    numerics: Numerics,
     finer: float = 1.5,
     stop_factor: float = 1.25,
     reach: float | None = None,

@@ -146,3 +146,20 @@ def test_dust_at_the_tip(drop):
 def test_what_tangles_says_so():
     with pytest.raises(RuntimeError, match="tangled"):
         mesh.run_drop(mesh.Dust(p_m=300.0), RADIUS, 1.5, mesh.Numerics(cells=5.0, depth=9.0))
+
+
+@pytest.mark.parametrize(
+    ("dust", "side"),
+    [
+        ({}, 0.15),
+        ({"eta": 0.04, "rate_n": 0.5}, 0.0),
+        ({"gradient": 8.0}, 0.0),
+        ({"crust": (0.03, 0.5e-3)}, 0.0),
+    ],
+)
+def test_what_campaigns_hide_holds_a_drop_back_and_closes_its_book(dust, side):
+    plain = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
+    held = mesh.run_drop(mesh.Dust(**dust), RADIUS, 0.30, side=side)
+    assert held.stopping_depth < 0.99 * plain.stopping_depth
+    assert abs(held.energy_error) < 0.005
+    assert (held.energies["side"] > 0.0) == (side > 0.0)
