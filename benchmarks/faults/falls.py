@@ -65,7 +65,7 @@ def shape_motion(law: str, rng: np.random.Generator, shapes: list) -> tuple[np.n
     """u, depth over (speed · stopping time) and deceleration at the stop over (speed / stopping time) of one law."""
     if law == "solver":
         u, z = shapes[rng.integers(len(shapes))]
-        return u, z, 1.3
+        return u, z, -float(UnivariateSpline(u, z, k=5, s=0).derivative(2)(1.0))
     slope = rng.uniform(-0.6, 0.6) if law == "linear" else 0.0
     radius, inertia = rng.uniform(0.2, 1.2), rng.uniform(0.0, 1.5)
 

@@ -20,6 +20,7 @@ ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
     "ease": 0.05,  # a push that has faded to nothing at the stop: dust has strength
 }
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
+PULL = 1.0  # of the mean deceleration: dust does not pull a projectile in, but a polynomial rings a little at contact
 NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
 
 
@@ -121,7 +122,6 @@ def choose_motion(
     models with different outliers can be compared.
     """
     stops = time[-1] > start[1] + 2.5 * float(np.median(np.diff(time)))
-    span = start[1] - start[0]
     first = ~guess_spikes(depth, error)
     found: list[Candidate] = []
     endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce") if stops else ("open",)
@@ -129,10 +129,8 @@ def choose_motion(
         if ending == "bounce" and any(_follows(candidate) for candidate in found):
             continue  # a bounce fits a rebound of some frames nearly as well, with a later stop: only where all else fails
         lead: Candidate | None = None
-        for degree in range({"rest": 0, "bounce": 0}.get(ending, 1), HIGHEST_DEGREE + 1):
-            starts = [(start[0], start[0] + factor * span) for factor in (1.0, 1.2, 1.5)]
-            if lead is not None:
-                starts = [(lead.motion.parameters[0], lead.motion.parameters[1])]
+        for degree in range({"ease": 1, "open": 1}.get(ending, 0), HIGHEST_DEGREE + 1):
+            starts = _guess_starts(start, ending) if lead is None else [tuple(lead.motion.ends)]
             here: Candidate | None = None
             # a poor model leaves out frames that a better one explains: begin again from the first guess too
             begins = [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]
@@ -165,6 +163,14 @@ def choose_motion(
     )
 
 
+def _guess_starts(start: tuple[float, float], ending: Ending) -> list[tuple[float, ...]]:
+    """Ends to begin from: a later end, or of a rebound more time to unload, than the first guess."""
+    t0, te = start
+    if ending == "rebound":
+        return [(t0, te, share * (te - t0)) for share in (0.02, 0.1, 0.4)]
+    return [(t0, t0 + factor * (te - t0)) for factor in (1.0, 1.2, 1.5)]
+
+
 def _follows(candidate: Candidate) -> bool:
     """Whether the rows scatter about the motion as they say, fewer than a tenth of them left out."""
     motion, most = candidate.motion, 0.1 * len(candidate.used)
@@ -178,7 +184,7 @@ def _weigh_outliers(motion: Motion, used: np.ndarray, time: FloatArray) -> Candi
     where so few frames show rest or rebound, one spike can make them.
     """
     spread = max(1.0, motion.chi_square / max(motion.freedom, 1))
-    beyond = int(np.sum(time[used] > motion.parameters[1])) if motion.ending != "open" else AFTER_END
+    beyond = int(np.sum(time[used] > motion.loose)) if motion.ending != "open" else AFTER_END
     many = int(np.sum(~used)) + max(AFTER_END - beyond, 0)
     return Candidate(motion, used, motion.chi_square + OUTLIER**2 * spread * many)
 
@@ -192,13 +198,16 @@ def _is_sound(motion: Motion, time: FloatArray) -> bool:
     t0, te, v0 = motion.parameters[:3]
     if (
         not np.isfinite(stop)
-        or t0 + stop >= time[-1]
+        or motion.loose >= time[-1]
         or v0 <= 0
         or not np.all(np.isfinite(motion.covariance))
     ):
         return False
-    speed = motion.evaluate(t0 + np.linspace(0.0, 0.999, 200) * stop)[1]
+    _, speed, acceleration = motion.evaluate(t0 + np.linspace(0.0, 0.999, 200) * stop)
     if np.any(speed < -0.01 * v0) or np.any(speed > 1.1 * v0):
         return False
+    free = motion.parameters[3]
+    if np.any(acceleration > free + PULL * v0 / stop):
+        return False
     error = np.sqrt(motion.covariance[1, 1])
-    return bool(te < time[-1] and error < 0.5 * (te - t0) and np.all(np.diag(motion.covariance) >= 0))
+    return bool(error < 0.5 * (te - t0) and np.all(np.diag(motion.covariance) >= 0))

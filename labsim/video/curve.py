@@ -99,7 +99,7 @@ def _fit_clock(track: Track, camera: Camera, name: object, *, search: bool = Tru
     for _ in range(WIDENINGS):
         window = time <= start[1] + max(AFTER_STOP * (start[1] - start[0]), LEAST_AFTER * spacing)
         choice = choose_motion(time[window], depth[window], error[window], start)
-        end = choice.best.motion.parameters[1] if choice is not None and choice.goes_on else start[1]
+        end = choice.best.motion.loose if choice is not None and choice.goes_on else start[1]
         enough = choice is not None and end + 0.2 * (end - start[0]) < time[window][-1]
         if window.all() or enough:
             break
@@ -263,7 +263,7 @@ def _find_rebound_speed(motion: Motion, parameters: FloatArray) -> float:
     if motion.ending == "bounce":
         return -float(parameters[-2])
     if motion.ending == "rebound":
-        return -float(motion.evaluate(parameters[1:2], parameters)[1][0])
+        return -float(motion.evaluate(parameters[1:2] + parameters[-1], parameters)[1][0])
     return float("nan")
 
 
@@ -274,5 +274,4 @@ def _refit_with_surface(
     if camera.surface_row_sigma <= 0:
         return None
     shift = camera.surface_row_sigma * camera.pixel_size
-    begin = (motion.parameters[0], motion.parameters[1])
-    return fit_motion(time, depth - shift, error, motion.degree, motion.ending, begin)
+    return fit_motion(time, depth - shift, error, motion.degree, motion.ending, tuple(motion.ends))

@@ -7,6 +7,8 @@ hard they bend.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.ndimage import median_filter
 
@@ -64,7 +66,7 @@ def fit_without_outliers(
     error: FloatArray,
     degree: int,
     ending: Ending,
-    start: tuple[float, float],
+    start: Sequence[float],
     used: np.ndarray,
 ) -> tuple[Motion, np.ndarray] | None:
     """One model fitted, its outliers dropped and taken back until they stand still: (motion, frames used)."""
@@ -80,6 +82,6 @@ def fit_without_outliers(
         if np.sum(renewed) < max(8, 0.5 * len(time)):
             return None
         seen.append(used)
-        used, start = renewed, (motion.parameters[0], motion.parameters[1])
+        used, start = renewed, tuple(motion.ends)
     assert motion is not None
     return motion, used

@@ -1,15 +1,24 @@
-"""Fitting a segmented motion: only contact and end of the deceleration are searched for.
+"""Fitting a segmented motion: only contact, end of the deceleration and, of a rebound, the time to unload are searched for.
 
-For given t0 and te the model is linear in everything else (variable projection: Golub & Pereyra 1973, with the derivative of
+For given ends the model is linear in everything else (variable projection: Golub & Pereyra 1973, with the derivative of
 Kaufman 1975). Frames long before the contact enter as the three numbers that say the same about every parabola through them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..records import STANDARD_GRAVITY, FloatArray
-from .segments import Ending, Motion, design_motion, differentiate_ends
+from .segments import (
+    Ending,
+    Motion,
+    design_motion,
+    differentiate_ends,
+    join_parameters,
+    order_columns,
+)
 
 GRAVITY_PRIOR_SIGMA = 3.0  # m/s^2; only steadies v0 where few frames lie before the contact
 
@@ -45,22 +54,26 @@ def fit_motion(
     sigma: FloatArray,
     degree: int,
     ending: Ending,
-    start: tuple[float, float],
+    start: Sequence[float],
 ) -> Motion | None:
-    """Fit one model; ``start`` = (t0, te) to begin from. Returns None where it cannot be fitted.
+    """Fit one model; ``start`` = (t0, te[, λ]) to begin from. Returns None where it cannot be fitted.
 
     time (s), depth and sigma (m): shape (n,). With an "open" end te is held at the last frame and the speed there is free.
     """
     opened = ending == "open"
-    columns = 2 + degree + 1 + {"rest": -1, "ease": -2, "rebound": 1, "bounce": 1, "open": 0}[ending]
+    columns = 2 + degree + 1 + {"rest": -1, "ease": -2, "rebound": 0, "bounce": 1, "open": 0}[ending]
     if len(time) < columns + 4 or (ending == "ease" and degree < 1):
         return None
     spacing = float(np.median(np.diff(time)))
     duration = time[-1] - time[0]
     reach = 3.0 * spacing + 0.15 * (start[1] - start[0])
-    low = np.array([start[0] - reach, start[0] + 2.0 * spacing])
+    low = np.array([start[0] - reach, start[0] + 2.0 * spacing, 0.02 * spacing])
     high = np.array(
-        [start[0] + reach, time[-1] + (0.0 if ending in ("rebound", "bounce") else 0.5 * duration)]
+        [
+            start[0] + reach,
+            time[-1] + (0.0 if ending in ("rebound", "bounce") else 0.5 * duration),
+            max(start[1] - start[0], 3.0 * spacing),
+        ]
     )
     early = time < low[0]
     free = _FreeFall(time[early], depth[early], sigma[early]) if np.sum(early) > 4 else None
@@ -74,7 +87,7 @@ def fit_motion(
     def build(q: FloatArray) -> FloatArray:
         prior = np.zeros((1, columns))
         prior[0, 1] = steady
-        z = design_motion(time, q[0], q[1], degree, ending, 1)[0]
+        z = design_motion(time, q, degree, ending, 1)[0]
         return np.vstack([prior, (z / sigma).T, *([free.design(q[0], columns)] if free is not None else [])])
 
     def solve(q: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -87,15 +100,18 @@ def fit_motion(
         return float(misfit @ misfit), misfit, linear, matrix, left
 
     def slope(q: FloatArray, linear: FloatArray) -> FloatArray:
-        p = np.concatenate([q, linear])
+        p = join_parameters(q, linear)
         by_ends = differentiate_ends(time, p, degree, ending)
-        parts = [np.zeros((1, 2)), by_ends / sigma[:, None]]
+        parts = [np.zeros((1, len(q))), by_ends / sigma[:, None]]
         if free is not None:
-            parts.append(np.column_stack([free.differentiate(p), np.zeros(3)]))
-        return np.vstack(parts)[:, : 1 if opened else 2]
+            parts.append(np.column_stack([free.differentiate(p), np.zeros((3, len(q) - 1))]))
+        return np.vstack(parts)[:, :free_ends]
 
     q = np.array([start[0], time[-1] if opened else start[1]])
-    free_ends = 1 if opened else 2
+    if ending == "rebound":
+        q = np.append(q, start[2] if len(start) > 2 else spacing)
+    free_ends = 1 if opened else len(q)
+    low, high = low[: len(q)], high[: len(q)]
     q[:free_ends] = np.clip(q, low, high)[:free_ends]
     try:
         cost, misfit, linear, matrix, left = solve(q)
@@ -119,7 +135,8 @@ def fit_motion(
             q, (cost, misfit, linear, matrix, left) = trial, better
             if (gain < 1e-6 * cost and gain < 1e-3) or moved < 1e-7 * spacing:
                 break
-        jacobian = np.column_stack([slope(q, linear), matrix])
+        ends = slope(q, linear)
+        jacobian = np.column_stack([ends, matrix]) if opened else order_columns(ends, matrix)
     except (ValueError, np.linalg.LinAlgError):
         return None
     scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-100)
@@ -128,5 +145,5 @@ def fit_motion(
         covariance = np.insert(np.insert(covariance, 1, 0.0, axis=0), 1, 0.0, axis=1)
     count = len(time) + int(np.sum(early))
     chi_square = cost - misfit[0] ** 2 + (free.left if free is not None else 0.0)
-    parameters = np.concatenate([q, linear])
+    parameters = join_parameters(q, linear)
     return Motion(degree, ending, parameters, covariance, chi_square, count - len(parameters))

@@ -15,6 +15,7 @@ from ..observe import ObservedDrop
 
 BIN = 8  # frames of free fall averaged into one point
 ALONG = 0.4  # of the stopping time, over which the solver's error of the depth changes
+REACH = 0.8  # e-folds of the final depth over the tip radius, over which it does
 FREE = 1.0e-3  # s, prior width of the contact time: as good as free
 SPEED_WIDTH = 0.05  # of ln speed, prior width
 LEAST_SURFACE = 1e-9  # m
@@ -120,19 +121,26 @@ class DropModel:
 
     unit = "m"
 
-    def slope(self, here: FloatArray) -> FloatArray:
+    def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
+        """Nothing beside what all records have."""
+        return {}
+
+    def slope(
+        self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
+    ) -> FloatArray:
         """What the solver may be off by a share of from shallow to deep drops, m."""
         return np.maximum(here, 0.0)
 
-    def find_solver_noise(self, here: FloatArray, stop: float) -> FloatArray:
+    def find_solver_noise(self, here: FloatArray, stop: float, final: float) -> FloatArray:
         """(n, 0): depths have none that is not smooth."""
         return np.zeros((here.size, 0))
 
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
-    ) -> tuple[FloatArray, float]:
-        """What the solver is off by in all such drops alike, m, and over which share of the stopping time that changes."""
-        return share * np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0), ALONG
+    ) -> tuple[FloatArray, float, float]:
+        """What the solver is off by in drops that go alike deep, m; over which share of the stopping time, and over how many
+        e-folds of depth over tip radius, that changes."""
+        return share * np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0), ALONG, REACH
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         """True times (s) of the data."""

@@ -15,7 +15,7 @@ from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph import DropSetting
 from ..forward import Instant
 from .acceleration_model import AccelerationModel
-from .drop_model import ALONG, FREE, SPEED_WIDTH, DropModel
+from .drop_model import ALONG, FREE, REACH, SPEED_WIDTH, DropModel
 from .push_model import PushModel
 
 RecordModel = DropModel | AccelerationModel | PushModel  # of what one instrument records of one drop or push
@@ -23,11 +23,8 @@ SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guid
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error
 MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
 LEAST_SCATTER = 1e-9
-ALIKE = (
-    0.8,
-    2.0,
-    1.5,
-)  # ln of final depth over tip radius, of radius, of mass over its cube: so far two codes differ alike
+# ln of final depth over tip radius, of radius, of mass over its cube: so far two codes differ alike
+ALIKE = (REACH, 2.0, 1.5)
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,8 @@ class Probe(NamedTuple):
 @dataclass(frozen=True)
 class NumericalError:
     """The solver's error of one drop. size : (n,) m; fraction : (n,) of the time to the stop; drops are alike by reach (ln of
-    final depth over tip radius), radius and mass (logarithms). length : over which share of the stopping time it changes."""
+    final depth over tip radius), radius and mass (logarithms). length : over which share of the stopping time, changes : over
+    how many e-folds of depth over tip radius it changes."""
 
     size: FloatArray
     fraction: FloatArray
@@ -74,6 +72,7 @@ class NumericalError:
     mass: float
     unit: str = "m"
     length: float = ALONG
+    changes: float = REACH
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,9 @@ def linearise_drop(
         by_strength * max(scatter, LEAST_SCATTER),
     ]
     final, stop = np.exp(code[0]), np.exp(code[1])
-    local = np.column_stack([*columns, zeros[:, 1:], model.find_solver_noise(here, float(stop))])
+    local = np.column_stack(
+        [*columns, zeros[:, 1:], model.find_solver_noise(here, float(stop), float(final))]
+    )
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
 
@@ -156,11 +157,14 @@ def linearise_drop(
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
         **model.share(differ, here, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
-        "numerical slope": model.slope(here) * (reach - USUAL_DEPTH) * terms.numerical_slope,
+        **model.share_solver(here, clock / float(stop), reach),
+        "numerical slope": model.slope(code, instrument, instant, here)
+        * (reach - USUAL_DEPTH)
+        * terms.numerical_slope,
         "numerical strength": by_strength * terms.numerical_strength,
     }
 
-    off, length = model.find_solver_error(here, clock, final, instrument, terms.numerical)
+    off, length, changes = model.find_solver_error(here, clock, final, instrument, terms.numerical)
     plain = here if code is response.plain else model.predict(response.plain, instrument, instant)
     numerical = NumericalError(
         np.hypot(off, (here - plain) * terms.numerical_change),
@@ -170,6 +174,7 @@ def linearise_drop(
         math.log(mass.mass / model.radius**3),
         model.unit,
         length,
+        changes,
     )
     drop = DropTerms(
         model.data - here,

@@ -18,6 +18,7 @@ from ...sph import DropRun
 from ..forward import Instant, ResponseTable
 from ..observe_push import Ground, ObservedPush
 from ..run_parts import Push
+from .drop_model import REACH
 
 PROFILE = 3.0  # of ln strength in each window, prior width: as good as free
 
@@ -121,11 +122,17 @@ class PushModel:
         }
         return {**profile, "gauge": np.full(self.data.size, gauge.scale_sigma)}
 
-    def slope(self, here: FloatArray) -> FloatArray:
+    def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
+        """Nothing beside what all records have."""
+        return {}
+
+    def slope(
+        self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
+    ) -> FloatArray:
         """What the solver may be off by from shallow to deep drops: it is pushed to one depth."""
         return np.zeros(self.data.size)
 
-    def find_solver_noise(self, here: FloatArray, stop: float) -> FloatArray:
+    def find_solver_noise(self, here: FloatArray, stop: float, final: float) -> FloatArray:
         """(n, n) root of the covariance of the ground's own differences, by columns."""
         apart = np.abs(np.subtract.outer(self.observed.depth, self.observed.depth))
         alike = np.exp(-apart / self.ground.length) + 1e-9 * np.eye(self.data.size)
@@ -133,9 +140,9 @@ class PushModel:
 
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
-    ) -> tuple[FloatArray, float]:
+    ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in all such pushes alike: the same at all depths."""
-        return np.full(self.data.size, share), 1.0
+        return np.full(self.data.size, share), 1.0, REACH
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return np.zeros(self.data.size)

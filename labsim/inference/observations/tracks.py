@@ -20,7 +20,7 @@ from ...records import FloatArray
 from ..blocks import Block, add_errors, lay_out
 from ..forward import Instant
 from . import RunFeatures
-from .drop_model import WIDTHS
+from .drop_model import REACH, WIDTHS
 from .drop_terms import (
     NumericalError,
     Probe,
@@ -100,7 +100,7 @@ def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
     counts = [part.size.size for part in parts]
     distance = np.subtract.outer(fraction, fraction)
     distance *= distance
-    apart = measure_distances([(part.reach, part.radius, part.mass) for part in parts])
+    apart = measure_distances([(part.reach * REACH / part.changes, part.radius, part.mass) for part in parts])
     # a depth and an acceleration are not off alike
     unit = np.array([part.unit for part in parts])
     apart += np.where(np.not_equal.outer(unit, unit), 1e4, 0.0)
