@@ -18,6 +18,7 @@ AFTER_END = 3  # frames used beyond the end of the deceleration
 LEAST_STRIDE = 4  # frames over which a speed is guessed
 ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
     "ease": 0.05,  # a push that has faded to nothing at the stop: dust has strength
+    "bounce": 0.05,  # thrown back by more than the push at the stop: something else than dust
 }
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
 PULL = 1.0  # of the mean deceleration: dust does not pull a projectile in, but a polynomial rings a little at contact
@@ -126,8 +127,6 @@ def choose_motion(
     found: list[Candidate] = []
     endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce") if stops else ("open",)
     for ending in endings:
-        if ending == "bounce" and any(_follows(candidate) for candidate in found):
-            continue  # a bounce fits a rebound of some frames nearly as well, with a later stop: only where all else fails
         lead: Candidate | None = None
         for degree in range({"ease": 1, "open": 1}.get(ending, 0), HIGHEST_DEGREE + 1):
             starts = _guess_starts(start, ending) if lead is None else [tuple(lead.motion.ends)]
@@ -169,13 +168,6 @@ def _guess_starts(start: tuple[float, float], ending: Ending) -> list[tuple[floa
     if ending == "rebound":
         return [(t0, te, share * (te - t0)) for share in (0.02, 0.1, 0.4)]
     return [(t0, t0 + factor * (te - t0)) for factor in (1.0, 1.2, 1.5)]
-
-
-def _follows(candidate: Candidate) -> bool:
-    """Whether the rows scatter about the motion as they say, fewer than a tenth of them left out."""
-    motion, most = candidate.motion, 0.1 * len(candidate.used)
-    enough = motion.chi_square < motion.freedom + 2.0 * np.sqrt(2.0 * max(motion.freedom, 1))
-    return bool(enough and np.sum(~candidate.used) < most)
 
 
 def _weigh_outliers(motion: Motion, used: np.ndarray, time: FloatArray) -> Candidate:
