@@ -12,12 +12,13 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 
 from labsim.inference.curves import decode_speed, encode_speeds
+from labsim.inference.grid import FELT_CELLS, interpolation_weights, speed_nodes, strength_node
 from labsim.inference.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
@@ -38,6 +39,11 @@ DROPS = (
 )
 STRENGTHS = (1000.0, 2200.0)  # Pa
 LAGS = (1, 2, 4, 8)  # stretches
+# what a fit sees: radius (m), mass over a bead's; speeds (m/s) and p_m (Pa) between the nodes
+PROJECTILE = (0.75e-3, 1.0)
+SPEEDS = (0.22, 0.26, 0.31, 0.36, 0.43, 0.52, 0.62, 0.74)
+BETWEEN = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2400.0)
+BANDS = (0.4, 0.55, 0.75, 1.0, 1.3, 2.2)  # of depth over tip radius
 
 
 def bin_force(speed_at: Callable[[np.ndarray], np.ndarray], stop: float) -> np.ndarray:
@@ -83,5 +89,55 @@ def main() -> None:
         )
 
 
+def compare_interpolated() -> None:
+    """What a fit sees, by depth."""
+    radius, heavier = PROJECTILE
+    mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * radius**3 * heavier
+    speeds = speed_nodes(min(SPEEDS), max(SPEEDS))
+    strengths = [strength_node(k) for k in range(-1, 3)]
+    codes = np.array(
+        [
+            [
+                encode_speeds(
+                    simulate(
+                        DropSetting(
+                            Projectile("hemisphere", radius, mass),
+                            speed,
+                            Material(p_m=p_m),
+                            spacing=radius / FELT_CELLS,
+                            after_stop=0.16,
+                        )
+                    )
+                )
+                for p_m in strengths
+            ]
+            for speed in speeds
+        ]
+    )
+    depths, off = [], []
+    for p_m, speed in product(BETWEEN, SPEEDS):
+        run = mesh.run_drop(mesh.Dust(p_m=p_m), radius, speed, mesh.Numerics(cells=12.0), mass=mass)
+        reference = bin_force(lambda t, run=run: np.interp(t, run.time, run.speed), run.stopping_time)
+        by_strength = interpolation_weights(np.log(strengths), math.log(p_m))
+        by_speed = interpolation_weights(np.log(speeds), math.log(speed))
+        code = np.einsum("i,j,ijk->k", by_speed, by_strength, codes)
+        seen = bin_force(lambda t, code=code: decode_speed(code, t), math.exp(code[1]))
+        depths.append(math.exp(code[0]) / radius)
+        off.append(100 * (seen - reference) / reference.max())
+    print(
+        "\n| depth, tip radii | drops | rms, % of the peak | mean at tenths of the stop, % |\n|---|---|---|---|"
+    )
+    for low, high in pairwise(BANDS):
+        some = np.array(off)[(np.array(depths) > low) & (np.array(depths) <= high)]
+        if some.size:
+            mean = some.mean(axis=0).reshape(10, -1).mean(axis=1)
+            print(
+                f"| {low} to {high} | {len(some)} | {some[:, : round(COMPARED * BINS)].std():.2f} | "
+                + ", ".join(f"{one:.1f}" for one in mean)
+                + " |"
+            )
+
+
 if __name__ == "__main__":
     main()
+    compare_interpolated()

@@ -46,7 +46,9 @@ def judge_frames(
     """
     slope = motion.differentiate(time)
     known = np.einsum("ni,ij,nj->n", slope, motion.covariance, slope) / error**2
-    misfit = (depth - motion.evaluate(time)[0]) / error
+    misfit = np.clip(
+        (depth - motion.evaluate(time)[0]) / error, -1e9, 1e9
+    )  # a fit that ran off has no bounds
     spread = max(1.0, 1.4826 * float(np.median(np.abs(misfit[used]))))
     free = np.where(used, np.clip(1.0 - known, 0.05, 1.0), 1.0 + known)
     score = misfit**2 / (free * spread**2)

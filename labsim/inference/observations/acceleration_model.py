@@ -139,7 +139,9 @@ class AccelerationModel:
         peak = float(np.max(np.abs(here)))
         inside = (fraction > 0.0) & (fraction < 1.0)
         return {
-            "force at contact": np.where(inside, FORCE_AT_CONTACT * peak * np.exp(-fraction / 0.05), 0.0),
+            "force at contact": np.where(
+                inside, FORCE_AT_CONTACT * peak * np.exp(-np.maximum(fraction, 0.0) / 0.05), 0.0
+            ),
             "force late": np.where(inside, FORCE_LATE * peak * reach * (2.0 * fraction - 1.0), 0.0),
         }
 
@@ -180,9 +182,12 @@ class AccelerationModel:
     def move(self, before: Instant, best: FloatArray, widths: tuple[float, float]) -> tuple[Instant, float]:
         """Nuisances after the best step (contact time, ln speed), and how far that was: in stretches, in per cent."""
         free, speed_width = widths
-        after = Instant(before.contact_time + best[0] * free, before.log_speed + best[1] * speed_width, 0.0)
+        seen = self.observed.contact_time
+        reach = SHOWS_CONTACT * (float(self.observed.end[-1]) - seen)  # the record shows it: a far model must not run off
+        contact = float(np.clip(before.contact_time + best[0] * free, seen - reach, seen + reach))
+        after = Instant(contact, before.log_speed + best[1] * speed_width, 0.0)
         stretch = float(np.median(self.observed.end - self.observed.begin))
-        return after, max(abs(best[0] * free) / stretch, abs(best[1] * speed_width) * 100)
+        return after, max(abs(contact - before.contact_time) / stretch, abs(best[1] * speed_width) * 100)
 
 
 def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
