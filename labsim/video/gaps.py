@@ -12,6 +12,7 @@ from .variable_projection import fit_motion
 
 BESIDE = 3  # steps on either side that say how far the projectile goes in one frame
 LEAST_STEP = 17.0  # error bars per frame: below, a missing frame cannot be told from noise
+MOST_WEIGHED = 4
 MOST_MISSING = 8
 MOST_PLACES = 80  # places tried
 RUN = 3  # outliers side by side that make one ask for the clock
@@ -132,8 +133,8 @@ def find_lost_frames(
 
     time (s), depth, error (m): (n,) as they were fitted from ``start`` to ``choice``. Asked where RUN outliers lie side by side
     or the rows scatter more than they say: then every place about them is tried with one frame more, with two, up to
-    MOST_MISSING, as long as the motion gains; the best is taken if it gains what an outlier costs and what so many trials bring
-    by chance. None otherwise.
+    MOST_MISSING. Of the MOST_WEIGHED counts that a simple motion likes best the one is taken that all motions do, if it gains
+    what an outlier costs and what so many trials bring by chance. None otherwise.
     """
     best = choice.best
     out = np.flatnonzero(~best.used)
@@ -148,24 +149,28 @@ def find_lost_frames(
     if len(places) > MOST_PLACES:
         places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))
     keep = ~guess_spikes(depth, error)
-    found, least = None, np.inf
+    rough: dict[int, tuple[float, int, tuple[float, float]]] = {}  # of so many frames: the best place with a simple motion
     for lost in range(1, MOST_MISSING + 1):
-        before, late = least, lost * spacing
+        late = lost * spacing
         for place in places:
             moved = time + late * (np.arange(len(time)) >= place)
             begin = start[0] + late * (start[0] >= time[place]), start[1] + late * (start[1] >= time[place])
             motion = fit_motion(moved[keep], depth[keep], error[keep], 4, "rest", begin)
-            if motion is not None and motion.chi_square < least:
-                found, least = (int(place), lost, moved, begin), motion.chi_square
-        if not least < before:
-            break
-    if found is None:
+            if motion is not None and motion.chi_square < rough.get(lost, (np.inf,))[0]:
+                rough[lost] = motion.chi_square, int(place), begin
+    # a simple motion miscounts: the nearest counts are weighed with every motion
+    near = sorted(rough, key=lambda lost: rough[lost][0])[:MOST_WEIGHED]
+    weighed: list[tuple[float, int, int, Choice]] = []
+    for lost in near:
+        _, place, begin = rough[lost]
+        moved = time + lost * spacing * (np.arange(len(time)) >= place)
+        choice = choose_motion(moved, depth, error, begin)
+        if choice is not None:
+            weighed.append((choice.best.judge(1.0), place, lost, choice))
+    if not weighed:
         return None
-    place, lost, moved, begin = found
-    better = choose_motion(moved, depth, error, begin)
+    _, place, lost, better = min(weighed, key=lambda each: each[0])
     chance = OUTLIER**2 + 2.0 * np.log(len(places) * lost)
-    if better is None:
-        return None
     # what is gained counts by the scatter that is left: rows of whole pixels scatter alike with any clock
     noise = max(1.0, better.best.motion.chi_square / max(better.best.motion.freedom, 1))
     if better.best.judge(noise) > best.judge(noise) - chance:
