@@ -17,6 +17,7 @@ from .run_parts import Motion
 FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)
 UNIT_SPLINES = np.ascontiguousarray(CubicSpline(FRACTIONS, np.eye(FRACTIONS.size)).c)
+CHANGE = 3  # degree of the polynomial that a small change of the speed up to the stop follows
 PIECES = 4  # of the spline through the speed up to the stop
 
 
@@ -38,6 +39,18 @@ def _smooth_to_the_stop() -> FloatArray:
 
 
 SMOOTHED = _smooth_to_the_stop()
+
+
+def _smooth_change() -> FloatArray:
+    """(n, n) from changes at FRACTIONS to those of a polynomial of degree CHANGE, fitted up to the stop."""
+    inside = FRACTIONS <= 1.0
+    powers = np.vander(FRACTIONS[inside], CHANGE + 1)
+    whole = np.eye(FRACTIONS.size)
+    whole[np.ix_(inside, inside)] = powers @ np.linalg.pinv(powers)
+    return whole
+
+
+SMOOTH_CHANGE = _smooth_change()
 
 
 def encode_run(run: DropRun | Motion) -> FloatArray:

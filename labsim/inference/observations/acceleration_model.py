@@ -18,7 +18,7 @@ import numpy as np
 
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
-from ..curves import decode_speed
+from ..curves import SMOOTH_CHANGE, decode_speed
 from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
@@ -131,6 +131,11 @@ class AccelerationModel:
             f"scale {each.column} {each.range:g}": output * self.observed.sensors[:, k] * each.scale_sigma
             for k, each in enumerate(accelerometer.sensors)
         }
+
+    def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
+        """``moved``, its difference from ``code`` up to the stop a polynomial: the difference of two rough forces is as rough as they
+        are, and a law without a name would fit the data with it."""
+        return np.concatenate([moved[:2], code[2:] + SMOOTH_CHANGE @ (moved - code)[2:]])
 
     def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
         """What the solver's force is off by in all drops: as the tip meets the dust, and later where it goes deeper.

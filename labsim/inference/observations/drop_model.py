@@ -121,6 +121,10 @@ class DropModel:
 
     unit = "m"
 
+    def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
+        """Depths are smooth."""
+        return moved
+
     def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
         """Nothing beside what all records have."""
         return {}
