@@ -133,8 +133,9 @@ class AccelerationModel:
         }
 
     def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """``moved``, its difference from ``code`` up to the stop a polynomial: the difference of two rough forces is as rough as they
-        are, and a law without a name would fit the data with it."""
+        """``moved``, its difference from ``code`` up to the stop a polynomial.
+
+        The difference of two rough forces is as rough as they are, and a law without a name would fit data with it."""
         return np.concatenate([moved[:2], code[2:] + SMOOTH_CHANGE @ (moved - code)[2:]])
 
     def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
