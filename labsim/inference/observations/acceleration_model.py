@@ -5,7 +5,7 @@ is expected to show follows from the speeds at the ends of each stretch, without
 1/BINS of the stopping time, or single samples where these are longer, and the free flight is one, which shows the zero.
 
 Errors: noise; zero of each sensor (stated, one a drop); scale of each sensor (stated, one for all drops); contact time and
-speed (free); noise of the particles' force. docs/acceleration.md has the figures.
+speed (free); noise of the particles' force. docs/acceleration-accuracy.md has the figures.
 """
 
 from __future__ import annotations
