@@ -90,6 +90,14 @@ def test_a_frame_lost_silently_is_found(lost: int) -> None:
     assert curve.clock[-1] == pytest.approx(len(rows) / RATE - 1 / RATE)
 
 
+@pytest.mark.parametrize("many", [2, 4, 6])
+def test_frames_lost_together_are_counted(many: int) -> None:
+    rows, _ = fall(1, 3.0, 26.0, 0.01)
+    curve = fit_deceleration(make_track(np.delete(rows, np.arange(50, 50 + many)), 0.01), CAMERA)
+    assert any(text.startswith(f"{many} frames are missing before frame 50") for text in curve.warnings)
+    assert curve.stopping_time.value == pytest.approx(26.0 / RATE, rel=0.01)
+
+
 def test_nothing_is_lost_where_nothing_is_missing() -> None:
     for seed in range(5):
         rows, _ = fall(seed, 3.0, 26.0, 0.01)
