@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..inference.fitting import Fit
+from ..inference.observe import Observed, ObservedDrop
+from ..inference.observe_acceleration import ObservedImpact
 from ..inference.observe_push import ObservedPush
 from ..inference.posterior import Posterior
 from ..inference.scatter import ScatterEstimate
@@ -22,13 +24,12 @@ from .phrases import add_article, list_names, say_count, say_range, shown_unit, 
 
 def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
     sample = campaign.sample
-    frames = sum(each.time.size for each in bench.drops if not isinstance(each, ObservedPush))
     tests = f", {say_count(len(campaign.strength_tests), 'static test')}" if campaign.strength_tests else ""
     words = (
-        f"{say_count(len(views), 'drop')} with {frames} frames, {say_count(len(campaign.scans), 'CT scan')}{tests}, into dust of "
-        f"filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, {sample.diameter * 1e3:g} mm wide and "
-        f"{sample.depth * 1e3:g} mm deep, in gas of {sample.gas_pressure:g} Pa. The nominal simulation is {campaign.geometry}, "
-        f"with gravity of {campaign.gravity:g} m/s²."
+        f"{say_count(len(views), 'drop')} with {_say_records(bench.drops)}, {say_count(len(campaign.scans), 'CT scan')}{tests}, "
+        f"into dust of filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, "
+        f"{sample.diameter * 1e3:g} mm wide and {sample.depth * 1e3:g} mm deep, in gas of {sample.gas_pressure:g} Pa. "
+        f"The nominal simulation is {campaign.geometry}, with gravity of {campaign.gravity:g} m/s²."
     )
     groups: dict[tuple, list[DropView]] = {}
     drops = {model.observed.name: model.observed for model in bench.tracks.models}
@@ -55,6 +56,14 @@ def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[D
     return {"words": words, "projectiles": rows, "left_out": "; ".join(_left_out(campaign.drops, drops))}
 
 
+def _say_records(drops: Sequence[Observed]) -> str:
+    """What is compared of all records, in words."""
+    frames = sum(each.time.size for each in drops if isinstance(each, ObservedDrop))
+    stretches = sum(each.time.size for each in drops if isinstance(each, ObservedImpact))
+    counts = ((frames, "frame"), (stretches, "mean acceleration"))
+    return " and ".join(say_count(count, what) for count, what in counts if count) or "no frames"
+
+
 def _left_out(drops: Sequence[Drop], used: dict[str, Any]) -> list[str]:
     lines = []
     for drop in drops:
@@ -74,9 +83,11 @@ def describe_calibration(
 ) -> dict[str, Any]:
     """fit: the one whose p_value this is; posteriors: (name of the model, posterior)."""
     first = posteriors[0][1]
+    filmed = any(isinstance(each, ObservedDrop) for each in bench.drops)
+    free_fall = "free fall averaged over eight frames; " if filmed else ""
     words = (
         "p_m says how hard the dust is to compress: its compressive strength is Σ = p_m ((φ − φ₁)/(φ₂ − φ))^(Δ ln 10). "
-        f"{fit.points} data enter the likelihood (free fall averaged over eight frames; the stated heights count). The nominal "
+        f"{fit.points} data enter the likelihood ({free_fall}the stated heights count). The nominal "
         f"model, that of campaign.toml, leaves χ² = {fit.chi_square:.0f}; where it is right, data as far off come with a "
         f"probability {state_p_value(p_value)}. "
     )

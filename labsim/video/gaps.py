@@ -149,7 +149,9 @@ def find_lost_frames(
     if len(places) > MOST_PLACES:
         places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))
     keep = ~guess_spikes(depth, error)
-    rough: dict[int, tuple[float, int, tuple[float, float]]] = {}  # of so many frames: the best place with a simple motion
+    rough: dict[
+        int, tuple[float, int, tuple[float, float]]
+    ] = {}  # of so many frames: the best place with a simple motion
     for lost in range(1, MOST_MISSING + 1):
         late = lost * spacing
         for place in places:

@@ -189,7 +189,9 @@ class AccelerationModel:
         """Nuisances after the best step (contact time, ln speed), and how far that was: in stretches, in per cent."""
         free, speed_width = widths
         seen = self.observed.contact_time
-        reach = SHOWS_CONTACT * (float(self.observed.end[-1]) - seen)  # the record shows it: a far model must not run off
+        reach = SHOWS_CONTACT * (
+            float(self.observed.end[-1]) - seen
+        )  # the record shows it: a far model must not run off
         contact = float(np.clip(before.contact_time + best[0] * free, seen - reach, seen + reach))
         after = Instant(contact, before.log_speed + best[1] * speed_width, 0.0)
         stretch = float(np.median(self.observed.end - self.observed.begin))
