@@ -166,9 +166,9 @@ def find_lost_frames(
     for lost in near:
         _, place, begin = rough[lost]
         moved = time + lost * spacing * (np.arange(len(time)) >= place)
-        choice = choose_motion(moved, depth, error, begin)
-        if choice is not None:
-            weighed.append((choice.best.judge(1.0), place, lost, choice))
+        chosen = choose_motion(moved, depth, error, begin)
+        if chosen is not None:
+            weighed.append((chosen.best.judge(1.0), place, lost, chosen))
     if not weighed:
         return None
     _, place, lost, better = min(weighed, key=lambda each: each[0])

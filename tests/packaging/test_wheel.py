@@ -70,9 +70,8 @@ def test_the_wheel_holds_code_and_the_data_of_the_demo(wheel: Path) -> None:
         assert name.removeprefix("labsim/") in {each.removeprefix("labsim/") for each in names}, name
     assert "labsim/data/guettler2009/campaign.toml" in names
     assert not any(name.startswith(("tests/", "data/", "notebooks/")) for name in names)
-    assert (
-        wheel.stat().st_size < 4_500_000
-    )  # of which the soundings in clay are 0.4 MB, the campaign with scans 2 MB
+    # pages and their pictures are 1.9 MB of it, the campaign with scans 1.3, code 0.6, the soundings in clay 0.3
+    assert wheel.stat().st_size < 5_000_000
 
 
 def test_the_sdist_builds_the_same_wheel(tmp_path: Path, wheel: Path) -> None:
