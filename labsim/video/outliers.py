@@ -23,8 +23,8 @@ ROUNDS = 12
 
 
 def follow_median(row: FloatArray) -> FloatArray:
-    """Running median over RANGE frames: rows that only grow come back unchanged, up to two spikes in five frames do not."""
-    return np.asarray(median_filter(row, RANGE, mode="nearest"))
+    """Running median over RANGE frames: up to two spikes in five frames go, rows that only grow stay, but at both ends."""
+    return np.asarray(median_filter(row, RANGE, mode="reflect"))
 
 
 def guess_spikes(row: FloatArray, sigma: FloatArray) -> np.ndarray:

@@ -161,6 +161,19 @@ def test_outliers_and_gaps() -> None:
     assert curve.stopping_time.value == pytest.approx(3e-3, abs=2e-5)
 
 
+def test_a_wrong_first_frame_is_not_where_the_track_begins() -> None:
+    """A spike of the first frame to below the surface: the frames after it show the free flight."""
+    track, depth = make_track(3, 0.03)
+    row = track.tip_row.copy()
+    row[0] = 300 + 0.5 * depth / PIXEL
+    curve = fit_deceleration(
+        Track(track.frame, track.time, row, track.sigma, track.valid, track.reason), CAMERA
+    )
+    assert not curve.used[0]
+    assert curve.penetration_depth.value == pytest.approx(depth, rel=0.005)
+    assert curve.stopping_time.value == pytest.approx(3e-3, abs=2e-5)
+
+
 def test_wrong_frame_rate_shows_in_free_fall_and_drop_height() -> None:
     track, _ = make_track(3, 0.02)
     fast = Track(track.frame, track.time / 1.06, track.tip_row, track.sigma, track.valid, track.reason)
