@@ -30,7 +30,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.diagnosis.screen import CONFUSABLE
-from labsim.diagnosis.shapes import MARK, with_shape
+from labsim.diagnosis.shapes import MARK
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.runs import RunStore
 
@@ -101,7 +101,7 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
         effect, label = bench.effects[name], name
         if shape is not None:
             label = f"{name}{MARK}{shape:g} as hidden"
-            bench.effects[label] = with_shape(effect, shape)
+            bench.effects[label] = effect.with_shape(shape)
         amplitudes[label] = value - effect.amplitudes[0].null
     start = (math.log(truth["pm"]), amplitudes)
     fit = fit_hypothesis(bench, tuple(amplitudes), start, nuisances=found.best, iterations=0)

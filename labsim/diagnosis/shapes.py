@@ -30,13 +30,6 @@ def shape_parameter(effect: Effect) -> Parameter | None:
     return next((parameter for parameter in effect.parameters if parameter.shape), None)
 
 
-def with_shape(effect: Effect, value: float) -> Effect:
-    """The effect with another default of its (first) shape parameter."""
-    chosen = shape_parameter(effect)
-    parameters = tuple(replace(p, null=value) if p is chosen else p for p in effect.parameters)
-    return replace(effect, parameters=parameters)
-
-
 def lay_out_shapes(bench: Workbench) -> None:
     """Settle shapes from the undisturbed dust, add variants of the others to the workbench's effects."""
     for name, effect in list(bench.effects.items()):
@@ -49,7 +42,7 @@ def lay_out_shapes(bench: Workbench) -> None:
         low, high = (float(parameter.prior.cdf(limit)) for limit in parameter.limits)
         for quantile in QUANTILES:
             value = float(f"{float(parameter.prior.ppf(low + (high - low) * quantile)):.2g}")
-            bench.effects[f"{name}{MARK}{value:g}"] = with_shape(effect, value)
+            bench.effects[f"{name}{MARK}{value:g}"] = effect.with_shape(value)
 
 
 def cause(name: str) -> str:
@@ -72,7 +65,7 @@ def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
     width = effect.amplitudes[0].scale
 
     def cost(log_shape: float) -> float:
-        bench.effects[name] = with_shape(effect, math.exp(log_shape))
+        bench.effects[name] = effect.with_shape(math.exp(log_shape))
         block = linearise_alone(bench, dust, {}, {name: 0.05 * effect.amplitudes[0].step})
         _step, _cov, chi, _det, _w = solve_globals([block], [name], {name: (0.0, width)})
         return chi - 2 * float(parameter.log_prior(math.exp(log_shape)))
@@ -93,7 +86,7 @@ def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
     curvature = (cost(best.x + step) + cost(best.x - step) - 2 * best.fun) / step**2 / 2
     sigma = math.exp(best.x) / math.sqrt(max(curvature, 1.0))
     price = float(parameter.log_prior(math.exp(best.x))) + 0.5 * math.log(2 * math.pi) + math.log(sigma)
-    bench.effects[name] = with_shape(effect, float(f"{math.exp(best.x):.3g}"))
+    bench.effects[name] = effect.with_shape(float(f"{math.exp(best.x):.3g}"))
     bench.shape_evidence[name] = min(price, 0.0)
 
 

@@ -42,7 +42,8 @@ class Parameter:
 
     null: the value that switches the effect off (for ``shape`` parameters, which do not matter at the null of the others:
     the value taken where nothing else is said). step: for tangents, towards the natural side. prior: its reason stands
-    in ``text``. symbol: as it is printed.
+    in ``text``. symbol: as it is printed. doubles: the amplitude at which what it acts on is twice what it is at null, of an
+    amplitude that acts in proportion and may be many times that.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Parameter:
     text: str
     shape: bool = False
     symbol: str = ""
+    doubles: float = math.inf
 
     def log_prior(self, value: FloatArray | float) -> np.ndarray:
         """ln of the prior density cut off at the limits, -inf outside; integrates to one between them."""
@@ -75,12 +77,21 @@ class Parameter:
 
     def grade(self, amplitude: float) -> float:
         """Where an amplitude lies on the scale on which what it does is smooth: ln of the ratio to null of what counts by that,
-        the amplitude itself of all else. A factor of 0.1 is as far from 0.2 as 0.5 is from 1."""
-        return math.log1p(amplitude / self.null) if self.is_ratio else amplitude
+        of the factor of what doubles, the amplitude itself of all else. A factor of 0.1 is as far from 0.2 as 0.5 from 1."""
+        whole = self._whole
+        return whole[1] * math.log1p(amplitude / whole[0]) if whole else amplitude
 
     def amplitude_at(self, grade: float) -> float:
         """The amplitude at a grade."""
-        return self.null * math.expm1(grade) if self.is_ratio else grade
+        whole = self._whole
+        return whole[0] * math.expm1(grade / whole[1]) if whole else grade
+
+    @property
+    def _whole(self) -> tuple[float, float] | None:
+        """The amplitude that doubles what it acts on, and the unit of grades, where these are logarithms."""
+        if self.is_ratio:
+            return self.null, 1.0
+        return (self.doubles, self.doubles) if math.isfinite(self.doubles) else None
 
     def draw(self, rng: np.random.Generator) -> float:
         """A value from the prior between the limits."""
@@ -185,6 +196,8 @@ class Effect:
     says: tuple[str, str] | None = (
         None  # the title where the first parameter lies below its null, and above it
     )
+    # (an amplitude, a value of the shape) -> what the amplitude is with it; the same where nothing is said
+    reshape: Callable[[Parameter, float], Parameter] | None = field(default=None, repr=False)
 
     def say(self, value: float) -> str:
         """What is wrong at a value of the first parameter, as a sentence without its end."""
@@ -202,6 +215,17 @@ class Effect:
     def amplitudes(self) -> tuple[Parameter, ...]:
         """The parameters that decide whether the effect is on."""
         return tuple(parameter for parameter in self.parameters if not parameter.shape)
+
+    def with_shape(self, value: float) -> Effect:
+        """The effect with another default of its (first) shape parameter, and amplitudes that do as much with it."""
+        chosen = next(each for each in self.parameters if each.shape)
+
+        def change(each: Parameter) -> Parameter:
+            if each is chosen:
+                return replace(each, null=value)
+            return each if each.shape or self.reshape is None else self.reshape(each, value)
+
+        return replace(self, parameters=tuple(change(each) for each in self.parameters))
 
     @property
     def costs_runs(self) -> bool:

@@ -246,6 +246,7 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
         description=inspect.cleandoc(module.__doc__ or ""),
         remedy=remedy,
         says=says,
+        reshape=_function(file, module, "reshape", 2),
     )
 
 
@@ -258,7 +259,8 @@ def _function(file: Path, module: types.ModuleType, name: str, count: int) -> Ca
     try:
         inspect.signature(function).bind(*range(count))
     except TypeError:
-        wanted = "(campaign)" if count == 1 else f"({name.removeprefix('change_')}, values, place)"
+        names = ("campaign",), ("parameter", "value"), (name.removeprefix("change_"), "values", "place")
+        wanted = f"({', '.join(names[count - 1])})"
         raise EffectError(file, name, f"does not take {count} arguments; write def {name}{wanted}") from None
     return function
 

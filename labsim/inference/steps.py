@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from .workbench import Workbench
 
 SETTLED = 0.02  # of a standard deviation
 CALM = 0.05  # move of nuisances, as move_nuisances counts it
+OVERSHOOTS = 0.7  # of the last move of nuisances: they go to and fro
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,15 @@ def solve_at(bench: Workbench, place: Place) -> Solved:
 
 
 def settle_nuisances(bench: Workbench, here: Solved, most: int) -> Solved:
-    """The same with the nuisances moved to their best there, ``most`` times."""
+    """The same with the nuisances moved to their best there, ``most`` times; where that overshoots, half as far."""
+    share, last = 1.0, math.inf
     for _ in range(most):
         place, shift = _follow(bench, here, here.place.log_p_m, here.place.values)
-        here = solve_at(bench, place)
+        if shift > OVERSHOOTS * last:
+            share *= 0.5
+        pairs = zip(here.place.nuisances, place.nuisances, strict=True)
+        moved = tuple(before + share * (after - before) for before, after in pairs)
+        here, last = solve_at(bench, replace(place, nuisances=moved)), shift
         if shift < CALM:
             break
     return here

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.diagnosis.shapes import with_shape
 from labsim.effects import (
     CATALOGUE,
     HalfNormal,
@@ -317,7 +316,7 @@ def test_both_forms_of_a_rate_gain_the_same_a_decade_where_the_strength_is_state
     effect = list_effects()["strength_rate"]
     campaign = dataclasses.replace(reference_campaign(), material=clay)
     place = list_places(campaign)[campaign.drops[0].name]
-    changed = with_shape(effect.for_campaign(campaign), n).apply(setting, {"per_decade": 0.14, "n": n}, place)
+    changed = effect.for_campaign(campaign).with_shape(n).apply(setting, {"per_decade": 0.14, "n": n}, place)
     law = make_constants(changed)
 
     def strength(decades: float) -> float:

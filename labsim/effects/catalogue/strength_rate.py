@@ -8,6 +8,7 @@ by λ, their gain a decade.
 """
 
 import math
+from dataclasses import replace
 
 from labsim.calibrated import find_parameter, read_constant, say_law, scale_value
 from labsim.effects import HalfNormal, Normal, Parameter
@@ -16,6 +17,7 @@ from labsim.sph.materials import list_numbers
 
 title = "The strength grows with the rate of strain"
 kind = "material"
+RATE = 1000.0  # 1/s, of dust at a tip
 ETA = Parameter(
     "eta",
     "s^n",
@@ -26,6 +28,7 @@ ETA = Parameter(
     symbol="η",
     text="Strengthening at 1/s. Rates at the tip are about speed over radius, 1000/s: 0.05 makes Σ there 2.5 times "
     "as large with n = 1/2, more than static and dynamic tests of the same dust leave room for.",
+    doubles=RATE**-0.5,
 )
 N = Parameter(
     "n",
@@ -83,6 +86,19 @@ def applies(campaign):
     needed = "strength_rate" if law == DUST else "rate_log"
     return (
         "" if needed in list_numbers(law) else f"the law {say_law(law)} has no strength that a rate changes"
+    )
+
+
+def reshape(parameter, n):
+    """η of another exponent that makes Σ at RATE as large; per_decade means the same with any n."""
+    if parameter.name != ETA.name:
+        return parameter
+    factor = RATE ** (N.null - n)
+    return replace(
+        parameter,
+        step=parameter.step * factor,
+        doubles=parameter.doubles * factor,
+        prior=HalfNormal(parameter.prior.sd * factor),
     )
 
 

@@ -138,18 +138,23 @@ class AccelerationModel:
         The difference of two rough forces is as rough as they are, and a law without a name would fit data with it."""
         return np.concatenate([moved[:2], code[2:] + SMOOTH_CHANGE @ (moved - code)[2:]])
 
-    def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
+    def share_solver(
+        self, here: FloatArray, clock: FloatArray, stop: float, reach: float
+    ) -> dict[str, FloatArray]:
         """What the solver's force is off by in all drops: as the tip meets the dust, and later where it goes deeper.
 
-        fraction : (n,) of the stopping time; reach : ln of depth over tip radius."""
+        clock : (n,) s since contact; stop : s; reach : ln of depth over tip radius."""
         peak = float(np.max(np.abs(here)))
-        inside = (fraction > 0.0) & (fraction < 1.0)
+        inside = self._share_inside(clock) * (clock < stop)
+        fraction = np.maximum(clock, 0.0) / stop
         return {
-            "force at contact": np.where(
-                inside, FORCE_AT_CONTACT * peak * np.exp(-np.maximum(fraction, 0.0) / 0.05), 0.0
-            ),
-            "force late": np.where(inside, FORCE_LATE * peak * reach * (2.0 * fraction - 1.0), 0.0),
+            "force at contact": FORCE_AT_CONTACT * peak * inside * np.exp(-fraction / 0.05),
+            "force late": FORCE_LATE * peak * reach * inside * (2.0 * fraction - 1.0),
         }
+
+    def _share_inside(self, clock: FloatArray) -> FloatArray:
+        """(n,) of each stretch that lies after contact: errors that come all at once would let no fit settle."""
+        return np.clip(0.5 + clock / (self.observed.end - self.observed.begin), 0.0, 1.0)
 
     def slope(
         self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
@@ -180,7 +185,7 @@ class AccelerationModel:
         """What the solver is off by in drops that go alike deep, m/s²; over which share of the stopping time, and over how many
         e-folds of depth over tip radius, that changes."""
         size = np.hypot(share * np.maximum(here, 0.0), FORCE_SHAPE * self._find_scale(here, final))
-        return np.where(clock > 0, size, 0.0), SHAPE_LENGTH, FORCE_REACH
+        return self._share_inside(clock) * size, SHAPE_LENGTH, FORCE_REACH
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return self.observed.time

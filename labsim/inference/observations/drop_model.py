@@ -125,7 +125,9 @@ class DropModel:
         """Depths are smooth."""
         return moved
 
-    def share_solver(self, here: FloatArray, fraction: FloatArray, reach: float) -> dict[str, FloatArray]:
+    def share_solver(
+        self, here: FloatArray, clock: FloatArray, stop: float, reach: float
+    ) -> dict[str, FloatArray]:
         """Nothing beside what all records have."""
         return {}
 
