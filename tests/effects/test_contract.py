@@ -325,3 +325,25 @@ def test_both_forms_of_a_rate_gain_the_same_a_decade_where_the_strength_is_state
     assert strength(0.0) == pytest.approx(5e4)
     assert (strength(1e-3) - strength(-1e-3)) / 2e-3 == pytest.approx(0.14 * 5e4, rel=1e-4)
     assert strength(1.0) == pytest.approx(57e3) if n == 0.0 else strength(1.0) > 57.1e3
+
+
+def test_an_exponent_of_the_rate_leaves_what_a_step_and_the_prior_make_of_the_strength():
+    """At 1000/s, whatever n; and equal grades multiply (1 + η 1000ⁿ) by equal factors."""
+    effect = list_effects()["strength_rate"]
+    for n in (0.2, 0.5, 1.0):
+        (eta,) = effect.with_shape(n).amplitudes
+        assert eta.step * 1000.0**n == pytest.approx(0.03 * 1000.0**0.5)
+        assert eta.prior.sd * 1000.0**n == pytest.approx(0.05 * 1000.0**0.5)
+        grades = eta.grade(eta.step) * np.arange(4)
+        factors = [1.0 + eta.amplitude_at(grade) * 1000.0**n for grade in grades]
+        assert np.diff(np.log(factors)) == pytest.approx(np.log(factors[1]) * np.ones(3))
+        assert eta.grade(eta.amplitude_at(0.7 * eta.step)) == pytest.approx(0.7 * eta.step)
+
+
+def test_a_reshape_that_takes_other_arguments_is_refused(tmp_path):
+    file = tmp_path / "wrong.py"
+    file.write_text(
+        (CATALOGUE / "strength_slope.py").read_text() + "\n\ndef reshape(parameter):\n    return parameter\n"
+    )
+    with pytest.raises(EffectError, match=r"write def reshape\(parameter, value\)"):
+        load_file(file)
