@@ -116,17 +116,21 @@ class Diagnosis(Judgement):
         return f"<Diagnosis of {self.campaign.name}: {said}>"
 
 
-def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1) -> Judgement:
-    """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do."""
+def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequence[Fit] = ()) -> Judgement:
+    """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do.
+
+    known : fits to the same data with other error terms, from which fits begin as well.
+    """
     lay_out_shapes(bench)
     screening = screen(bench, nominal, np.random.default_rng(seed))
     p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
     unknown = fit_unknown(bench, nominal)
     fits = confirm_singles(bench, nominal, screening)
     explored: dict[str, Fit] = {}
-    if is_open(bench, nominal, fits, screening):
+    if is_open(bench, nominal, fits, screening, unknown.evidence):
         explored = explore(bench, nominal, screening, fits)
         fits = confirm_explored(bench, nominal, fits, explored, unknown.evidence)
+    fits = confirm_known(bench, fits, known)
     fits = settle_best(bench, fits, unknown.evidence)
     rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
     pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
@@ -179,7 +183,7 @@ def judge_scatters(
     larger = _find_larger(found, least)
     if larger is None:
         return found
-    return judge_campaign(*open_with(replace(terms, scatter=larger)), seed=seed)
+    return judge_campaign(*open_with(replace(terms, scatter=larger)), seed=seed, known=found.rivals)
 
 
 def _find_larger(found: Judgement, least: Scatter) -> float | None:
@@ -365,6 +369,21 @@ def confirm_explored(
         if name not in known or fit.evidence > known[name].evidence:
             known[name] = fit
     return list(known.values())
+
+
+def confirm_known(bench: Workbench, fits: list[Fit], known: Sequence[Fit]) -> list[Fit]:
+    """The fits with those joined, or replaced, that start from the best of ``known``."""
+    best = {fit.hypothesis[0]: fit for fit in fits}
+    singles = [each for each in known if len(each.hypothesis) == 1 and bench.costs_runs(each.hypothesis[0])]
+    top = max((each.evidence for each in singles), default=0.0)
+    for start in singles:
+        name = start.hypothesis[0]
+        if start.evidence > top - CLOSE:
+            with suppress(ExtrapolationError):
+                fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values))
+                if name not in best or fit.evidence > best[name].evidence:
+                    best[name] = fit
+    return list(best.values())
 
 
 def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list[Fit]:

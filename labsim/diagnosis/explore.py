@@ -27,12 +27,15 @@ HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed 
 FIRST_STEPS = 4
 
 
-def is_open(bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening) -> bool:
+def is_open(
+    bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening, without_place: float
+) -> bool:
     """Whether the nominal model fails, and either nothing explains the data or only what p_m can be traded for.
 
     However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another.
+    without_place : ln evidence of a law without a name.
     """
-    best = screening.scores[0].log_bayes if screening.scores else -math.inf
+    best = max([without_place - nominal.evidence, *(each.log_bayes for each in screening.scores[:1])])
     if best <= PROMISING and goodness_of_fit(nominal) >= DOUBTFUL:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
