@@ -18,7 +18,17 @@ from .blocks import Block
 from .evidence import integrate_by_laplace
 from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
 from .observations.tracks import DropsBlock
-from .steps import Place, Solved, advance, hold, hold_strength, settle_nuisances, solve_at, stop_at_limits
+from .steps import (
+    LOWER,
+    Place,
+    Solved,
+    advance,
+    hold,
+    hold_strength,
+    settle_nuisances,
+    solve_at,
+    stop_at_limits,
+)
 from .tangents import Blocks, linearise_at
 from .workbench import Workbench
 
@@ -29,7 +39,6 @@ ITERATIONS, PATIENT = 40, 12
 # p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
 # looked for where that costs nothing; below the second it fails, and runs are made to find out why
 DOUBTFUL, REJECTED = 0.05, 0.01
-LOWER = 3.0  # ln likelihood that a step may lose: its aim, the least χ², lies that far from the top or less
 HIGHER = 0.1  # ln likelihood by which a place on the way has to be better than the end
 MOST_HALVED = 3  # times a step is
 MOST_NUISANCES = 3  # times nuisances alone are moved

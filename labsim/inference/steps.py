@@ -15,6 +15,7 @@ from .workbench import Workbench
 
 SETTLED = 0.02  # of a standard deviation
 CALM = 0.05  # move of nuisances, as move_nuisances counts it
+LOWER = 3.0  # ln likelihood that a step may lose: its aim, the least χ², lies that far from the top or less
 OVERSHOOTS = 0.7  # of the last move of nuisances: they go to and fro
 
 

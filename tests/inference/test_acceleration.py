@@ -122,8 +122,8 @@ def test_nuisances_that_go_to_and_fro_settle(overshoot: float, monkeypatch: pyte
         return steps.Place(log_p_m, values, (overshoot * off,)), float(abs(off[0]))
 
     monkeypatch.setattr(steps, "_follow", follow)
-    monkeypatch.setattr(steps, "solve_at", lambda bench, place: SimpleNamespace(place=place))
-    begin = SimpleNamespace(place=steps.Place(0.0, {}, (np.array([1.0]),)))
+    monkeypatch.setattr(steps, "solve_at", lambda bench, place: SimpleNamespace(place=place, height=0.0))
+    begin = SimpleNamespace(place=steps.Place(0.0, {}, (np.array([1.0]),)), height=0.0)
     end = steps.settle_nuisances(None, begin, 12)  # type: ignore[arg-type]
     assert abs(end.place.nuisances[0][0]) < 0.1
 
