@@ -64,7 +64,8 @@ MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes ab
 class Judgement:
     """What is at work in a campaign, before any posterior is sampled. best : the fit that the verdict rests on.
 
-    p_value : of the nominal model; predicted : of held-out drops with the best listed cause, 1 where it was not asked for.
+    p_value : of the nominal model; predicted : of held-out drops with the best listed cause, or of all that it was fitted to
+    where it fails there; 1 where neither was asked for.
     """
 
     campaign: Campaign
@@ -140,6 +141,8 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
     predicted = 1.0
     if p_value < REJECTED and rivals:
         predicted = check_prediction(bench, leading, np.random.default_rng(seed))
+        if fails(leading):
+            predicted = min(predicted, goodness_of_fit(leading))
     if not any(family.pushed for family in bench.families) and is_wanted(
         p_value, rivals, unknown.evidence, predicted
     ):  # the laws without a name are those of drops
@@ -252,9 +255,10 @@ def diagnose_campaign(
     if found.p_value < REJECTED:
         warnings += doubt_surface_rows(seen.drops)
     if found.predicted < PREDICTED:
+        lacks = "explain the data" if fails(found.leading) else "predict drops that no fit has seen"
         warnings.append(
-            f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not predict "
-            f"drops that no fit has seen (p = {found.predicted:.2g}): something that is not listed may be at work"
+            f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not {lacks} "
+            f"(p = {found.predicted:.2g}): something that is not listed may be at work"
         )
     if found.verdict.word == "unknown":
         warnings.append(
@@ -306,6 +310,11 @@ def allow_for_codes(bench: Workbench, nominal: Fit, fit: Fit) -> Fit:
     if not any(bench.effects[name].kind == "material" for name in fit.hypothesis):
         return fit
     return replace(fit, between_codes=bench.terms.change_of_strength * abs(fit.log_p_m - nominal.log_p_m))
+
+
+def fails(fit: Fit) -> bool:
+    """Whether a hypothesis does not explain the data that it was fitted to."""
+    return goodness_of_fit(fit) < REJECTED
 
 
 def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:

@@ -15,7 +15,8 @@ TEMPERATURE = 3.0  # among causes: what tells one from another rests on details 
 # of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
 # most 5.5, the weakest that was 9.6
 NESTED = 2.0
-PREDICTED = 0.05  # p value of the best cause's held-out drops below which a cause that is not listed gets the odds that it allows
+# p value of the best cause's held-out drops, or of its own data, below which what is not listed gets the odds that it allows
+PREDICTED = 0.05
 NAMED = 0.9  # probability that what a verdict names holds together
 MOST_NAMED = 3
 
@@ -80,8 +81,9 @@ def judge(
     by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
 
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
-    p value of held-out drops with the best cause. Where they are missed, unknown stands to that cause at least as its prior does
-    to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p): Sellke et al. (2001).
+    p value of held-out drops with the best cause, or of its own data. Where they are missed, unknown stands to that cause at
+    least as its prior does to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p):
+    Sellke et al. (2001).
     """
     singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
     pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
