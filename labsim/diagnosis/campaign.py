@@ -140,9 +140,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
     leading = find_leading(rivals, nominal)
     predicted = 1.0
     if p_value < REJECTED and rivals:
-        predicted = check_prediction(bench, leading, np.random.default_rng(seed))
-        if fails(leading):
-            predicted = min(predicted, goodness_of_fit(leading))
+        predicted = check_leading(bench, leading, np.random.default_rng(seed))
     if not any(family.pushed for family in bench.families) and is_wanted(
         p_value, rivals, unknown.evidence, predicted
     ):  # the laws without a name are those of drops
@@ -310,6 +308,12 @@ def allow_for_codes(bench: Workbench, nominal: Fit, fit: Fit) -> Fit:
     if not any(bench.effects[name].kind == "material" for name in fit.hypothesis):
         return fit
     return replace(fit, between_codes=bench.terms.change_of_strength * abs(fit.log_p_m - nominal.log_p_m))
+
+
+def check_leading(bench: Workbench, leading: Fit, rng: np.random.Generator) -> float:
+    """p value of held-out drops with the leading cause, or of the data that it was fitted to where it fails there."""
+    predicted = check_prediction(bench, leading, rng)
+    return min(predicted, goodness_of_fit(leading)) if fails(leading) else predicted
 
 
 def fails(fit: Fit) -> bool:

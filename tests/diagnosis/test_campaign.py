@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
+from labsim.diagnosis import campaign
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.judge import NESTED, PRIOR_PAIRS, TEMPERATURE, judge
+from labsim.inference.blocks import Block
 from labsim.inference.fitting import Fit
 from labsim.inference.runs import RunStore
 
@@ -95,6 +97,19 @@ def test_a_cause_that_does_not_predict_held_out_drops_stands_back_behind_unknown
     else:
         assert found["unknown",] < 1e-30
     assert sum(found.values()) == pytest.approx(1.0)
+
+
+def test_a_cause_that_does_not_fit_its_own_data_is_doubted(monkeypatch):
+    """A thousand residuals of 1 and of 1.4 standard deviations, both with held-out drops that are predicted."""
+    monkeypatch.setattr(campaign, "check_prediction", lambda bench, fit, rng: 0.4)
+
+    def check(size):
+        block = Block(size * np.tile([1.0, -1.0], 500), np.eye(1000), {})
+        fit = replace(fake_fit(("a",), 90.0), blocks=(block,))
+        return campaign.check_leading(None, fit, np.random.default_rng(1))
+
+    assert check(1.0) == 0.4
+    assert check(1.4) < 1e-12
 
 
 def test_a_pair_must_earn_its_second_effect():
