@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -108,6 +109,7 @@ def judge(
             weigh_prior(hypothesis, catalogue) + nominal.evidence + tempered + min(value, 0.0)
         )
     if predicted < PREDICTED:
+        predicted = max(predicted, sys.float_info.min)  # that of a bad misfit rounds to nought
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
         first = max(weight[hypothesis] for hypothesis in gain)
