@@ -49,6 +49,23 @@ def test_depth_speed_contact_and_stop_of_a_known_motion(tmp_path: Path) -> None:
     assert not impact.warnings
 
 
+@pytest.mark.parametrize("zero", [-0.13, 0.13, 0.15])
+def test_a_sensor_of_little_noise_may_have_its_zero_off(tmp_path: Path, zero: float) -> None:
+    """By three of its stated errors and a hundred times the noise; the blow is weak beside that."""
+    weak = (3.0, 90.0, 0.12)
+    folder = accelerations.write_campaign(tmp_path / "c", drops=[weak], noise=2e-4)
+    file = folder / "drops" / "D01" / "acceleration.csv"
+    time, felt = np.loadtxt(file, delimiter=",", skiprows=1).T
+    assert abs(zero) > 0.02 * felt.max()
+    contact = accelerations.make_pulse(*weak)[2]
+    falling = (time > contact - 5e-3) & (time < contact - 1e-3)
+    accelerations.write_record(file.parent, time, felt - felt[falling].mean() + zero)
+    impact = look(read_campaign(folder))
+    _, stop = move(weak[0] * 1e-3, weak[1] * 1e-6, weak[2], 1300.0)
+    assert impact.contact_time == pytest.approx(contact, abs=0.05 * stop)
+    assert impact.stopping_time == pytest.approx(stop, rel=0.05)
+
+
 def test_the_depth_has_the_error_that_scale_and_zero_leave(tmp_path: Path) -> None:
     """Forty records with a scale and a zero of their own: the depths scatter as they say, within a factor of two."""
     pulls = []

@@ -27,6 +27,7 @@ LARGEST = 1e9  # s, or units of a reading; beyond it nothing is believed
 NEAR_RANGE = 0.99  # of the range, from where a sensor is taken as saturated
 SHORT, LONG = 1e-7, 2e-3  # s, between which a sampling interval of an impact is believed
 SEEN = 5.0  # standard deviations: of a reading that is more than noise
+ZERO = 4.0  # the same of a zero that is off
 LOST = 1.5  # sampling intervals: a longer one is a gap
 FLIGHT = 5  # samples of rest and of flight that a release takes
 RELEASE = 10.0  # ln of the odds
@@ -225,7 +226,7 @@ def find_contact(record: Acceleration, accelerometer: Accelerometer, path: Path)
             sensor.column,
             f"is largest downwards ({least / STANDARD_GRAVITY:.3g} g): an impact reads upwards; turn its sign{turned}",
         )
-    floor = SEEN * sigma + max(each.offset_sigma for each in accelerometer.sensors)
+    floor = SEEN * sigma + ZERO * max(each.offset_sigma for each in accelerometer.sensors)
     if felt[peak] < 2 * STANDARD_GRAVITY or felt[peak] < 3 * floor[peak]:
         raise MeasurementError(
             path,
@@ -259,16 +260,21 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     time, felt = record.time, record.felt
     offset = max(each.offset_sigma for each in accelerometer.sensors)
     peak = int(np.argmax(felt))
-    floor = max(SEEN * float(record.sigma[first]) + offset, 0.02 * float(felt.max()))
-    contact = _refine(record, first, floor)
+    released, release_sigma, flight = _find_release(record, first)
+    # at the sensor's own zero, as free flight shows it, where that is known better than it is stated
+    zero = flight.value if flight.sigma < offset else 0.0
+    zero_sigma = min(offset, flight.sigma)
+    floor = max(SEEN * float(record.sigma[first]) + zero_sigma, 0.02 * float(felt.max()))
+    quiet = np.nonzero(felt[: first + 1] - zero < floor)[0]
+    first = int(quiet[-1]) + 1 if quiet.size else first
+    contact = _refine(record, first, zero, floor)
     first = int(np.searchsorted(time, contact))
     warnings = []
     if record.saturated:
         warnings.append(f"{record.saturated} samples lie beyond the range of every sensor and are left out")
     if record.lost:
         warnings.append(f"{record.lost} samples are missing")
-    released, release_sigma, flight = _find_release(record, first)
-    allowed = 4 * math.hypot(offset, flight.sigma)
+    allowed = ZERO * math.hypot(offset, flight.sigma)
     if abs(flight.value) > REST * STANDARD_GRAVITY:
         raise MeasurementError(
             path,
@@ -286,15 +292,12 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
             fallen,
             STANDARD_GRAVITY * math.hypot(release_sigma, 2 * record.step, 0.2 * (time[peak] - contact)),
         )
-    # at the sensor's own zero, as free flight shows it, where that is known better than it is stated
-    zero = flight.value if flight.sigma < offset else 0.0
     net = np.append(-STANDARD_GRAVITY, felt[first:] - zero - STANDARD_GRAVITY)
     clock = np.append(0.0, time[first:] - contact)
     given_up = np.concatenate([[0.0], np.cumsum(0.5 * (net[1:] + net[:-1]) * np.diff(clock))])
     speed, source = _choose_speed(drop, flight_speed, given_up)
     sensors = accelerometer.sensors
     scale = max(each.scale_sigma for each in sensors)
-    zero_sigma = min(offset, flight.sigma)
     velocity = speed.value - given_up
     # errors leave a rest of speed at the stop: it is over where that is small and the force gone
     doubt = np.sqrt(
@@ -353,9 +356,9 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     )  # fmt: skip
 
 
-def _refine(record: Acceleration, first: int, floor: float) -> float:
-    """Contact (s): the rise from the first sample above the noise to twice that, drawn back to nothing."""
-    later = record.felt[first:] > 2 * floor
+def _refine(record: Acceleration, first: int, zero: float, floor: float) -> float:
+    """Contact (s): the rise from the first sample above the noise to twice that, drawn back to the zero (m/s²)."""
+    later = record.felt[first:] - zero > 2 * floor
     at = first + int(np.argmax(later)) if later.any() else first
     begin = float(record.time[first] - 0.5 * record.step)
     return max(begin - float(record.time[at] - record.time[first]), float(record.time[0]))

@@ -82,7 +82,8 @@ def test_probabilities_follow_bayes():
 
 
 @pytest.mark.parametrize(
-    ("predicted", "word"), [(1.0, "effect"), (0.06, "effect"), (0.03, "effect"), (0.01, "unknown"), (1e-300, "unknown")]
+    ("predicted", "word"),
+    [(1.0, "effect"), (0.06, "effect"), (0.03, "effect"), (0.01, "unknown"), (1e-300, "unknown")],
 )
 def test_a_cause_that_does_not_predict_held_out_drops_stands_back_behind_unknown(predicted, word):
     catalogue = ["a", "b", "c", "d"]
