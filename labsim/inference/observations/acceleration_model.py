@@ -102,8 +102,9 @@ class AccelerationModel:
         return STANDARD_GRAVITY - (after - before) / (end - begin)
 
     def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
-        """Derivative of ``predict`` by the contact time, m/s³, over a tenth of a stretch."""
-        step = 0.1 * float(np.median(self.observed.end - self.observed.begin))
+        """Derivative of ``predict`` by the contact time, m/s³, over a stretch to either side: the force begins inside one, and a
+        slope taken there alone points a contact that is late away from the data."""
+        step = float(np.median(self.observed.end - self.observed.begin))
         late = instant._replace(contact_time=instant.contact_time + step)
         early = instant._replace(contact_time=instant.contact_time - step)
         return (self.predict(code, instrument, late) - self.predict(code, instrument, early)) / (2 * step)
