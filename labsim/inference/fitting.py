@@ -39,7 +39,6 @@ ITERATIONS, PATIENT = 40, 12
 # p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
 # looked for where that costs nothing; below the second it fails, and runs are made to find out why
 DOUBTFUL, REJECTED = 0.05, 0.01
-HIGHER = 0.1  # ln likelihood by which a place on the way has to be better than the end
 MOST_HALVED = 3  # times a step is
 MOST_NUISANCES = 3  # times nuisances alone are moved
 
@@ -100,8 +99,7 @@ def fit_hypothesis(
 ) -> Fit:
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
-    A step that ends lower than it began, by more than LOWER, is halved until it does not, MOST_HALVED times at most. Of all
-    places on the way the highest is the answer.
+    A step that ends lower than it began, by more than LOWER, is halved until it does not, MOST_HALVED times at most.
     coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
     least : ln likelihood, priors included, of a start below which no step is taken.
@@ -111,7 +109,6 @@ def fit_hypothesis(
     values = {name: hold(bench, name, start[1].get(name, 0.0)) for name in hypothesis}
     place = Place(hold_strength(bench, start[0]), values, begin)
     best: Solved | None = None
-    top: Solved | None = None
     share, settled, calm = 1.0, False, False
     gain = math.inf
     for iteration in range(iterations + 1):
@@ -126,7 +123,6 @@ def fit_hypothesis(
         if best is None or there.height >= best.height - LOWER:
             gain = math.inf if best is None else there.height - best.height
             best, share, calm = there, 1.0, False
-            top = best if top is None or best.height > top.height else top
         else:
             share *= 0.5
         if settled or share < 0.5**MOST_HALVED or best.height < least:
@@ -139,10 +135,6 @@ def fit_hypothesis(
     if not (settled or calm):
         best = settle_nuisances(bench, best, MOST_NUISANCES)
     step = np.abs(stop_at_limits(bench, best)[0]) / np.sqrt(np.diag(best.covariance))
-    if top is not None and top.height > best.height + HIGHER:
-        # the least χ² has errors of its own size; where these change with the globals it is not the top
-        again = settle_nuisances(bench, solve_at(bench, top.place), MOST_NUISANCES)
-        best = again if again.height > best.height else best
     return Fit(
         hypothesis,
         best.place.log_p_m,
