@@ -14,6 +14,7 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
+from labsim.effects import Instrument
 from labsim.inference import steps
 from labsim.inference.calibrate import calibrate, prepare
 from labsim.inference.curves import FRACTIONS, SMOOTH_CHANGE
@@ -109,6 +110,21 @@ def test_the_likelihood_has_no_jump_as_contact_moves(tmp_path: Path) -> None:
         (block,) = linearise_at(bench, (moved,), fit_.log_p_m, {})
         seen.append(block.chi_square + block.log_determinant)
     assert np.abs(np.diff(seen)).max() < 0.5
+
+
+def test_a_contact_that_is_late_is_told_so_by_the_stretch_before_it(tmp_path: Path) -> None:
+    """The force would reach into that stretch if contact were earlier: a slope of nought there would leave it late for ever."""
+    folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
+    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = bench.tracks.models[0]
+    assert isinstance(model, AccelerationModel)
+    before = int(np.argmax(model.observed.end > model.observed.contact_time)) + 1
+    late = model.start._replace(contact_time=float(model.observed.end[before]))
+    code = model.table.code(fit_.log_p_m, late.log_speed, {})
+    slope = model.by_contact(code, Instrument(), late)
+    assert model.predict(code, Instrument(), late)[before] == pytest.approx(0.0, abs=1e-3)
+    assert slope[before] < -0.01 * abs(slope).max()
+    assert slope[before - 2] == pytest.approx(0.0, abs=1e-6 * abs(slope).max())
 
 
 @pytest.mark.parametrize("overshoot", [-0.9, -1.0, -1.3])
