@@ -119,7 +119,8 @@ def test_a_contact_that_is_late_is_told_so_by_the_stretch_before_it(tmp_path: Pa
     model = bench.tracks.models[0]
     assert isinstance(model, AccelerationModel)
     before = int(np.argmax(model.observed.end > model.observed.contact_time)) + 1
-    late = model.start._replace(contact_time=float(model.observed.end[before]))
+    width = float(model.observed.end[before] - model.observed.begin[before])
+    late = model.start._replace(contact_time=float(model.observed.end[before]) + 0.5 * width)
     code = model.table.code(fit_.log_p_m, late.log_speed, {})
     slope = model.by_contact(code, Instrument(), late)
     assert model.predict(code, Instrument(), late)[before] == pytest.approx(0.0, abs=1e-3)
