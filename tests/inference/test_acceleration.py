@@ -119,7 +119,7 @@ def test_a_contact_that_is_late_is_told_so_by_the_stretch_before_it(tmp_path: Pa
     model = bench.tracks.models[0]
     assert isinstance(model, AccelerationModel)
     before = int(np.argmax(model.observed.end > model.observed.contact_time)) + 1
-    width = float(model.observed.end[before] - model.observed.begin[before])
+    width = float(np.median(model.observed.end - model.observed.begin))
     late = model.start._replace(contact_time=float(model.observed.end[before]) + 0.5 * width)
     code = model.table.code(fit_.log_p_m, late.log_speed, {})
     slope = model.by_contact(code, Instrument(), late)
