@@ -14,6 +14,7 @@ from ..records import FloatArray
 from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
 from .segments import HIGHEST_DEGREE, Ending, Motion
 
+ENDINGS: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce")
 AFTER_END = 3  # frames used beyond the end of the deceleration
 LEAST_STRIDE = 4  # frames over which a speed is guessed
 ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
@@ -115,18 +116,21 @@ def _guess_stop(time: FloatArray, depth: FloatArray, contact: int, t0: float) ->
 
 
 def choose_motion(
-    time: FloatArray, depth: FloatArray, error: FloatArray, start: tuple[float, float]
+    time: FloatArray,
+    depth: FloatArray,
+    error: FloatArray,
+    start: tuple[float, float],
+    endings: tuple[Ending, ...] = ENDINGS,
 ) -> Choice | None:
     """Every model that explains the rows, weighed by Schwarz's criterion (Kass & Raftery 1995); None if none does.
 
-    Rest and rebound of all degrees; if nothing stops, an open end. Every frame left out costs a model OUTLIER² of χ², so that
+    The ``endings`` of all degrees; if nothing stops, an open end. Every frame left out costs a model OUTLIER² of χ², so that
     models with different outliers can be compared.
     """
     stops = time[-1] > start[1] + 2.5 * float(np.median(np.diff(time)))
     first = ~guess_spikes(depth, error)
     found: list[Candidate] = []
-    endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce") if stops else ("open",)
-    for ending in endings:
+    for ending in endings if stops else ("open",):
         lead: Candidate | None = None
         for degree in range({"ease": 1, "open": 1}.get(ending, 0), HIGHEST_DEGREE + 1):
             starts = _guess_starts(start, ending) if lead is None else [tuple(lead.motion.ends)]

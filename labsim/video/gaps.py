@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..records import FloatArray
-from .choosing import Choice, choose_motion
+from .choosing import ENDINGS, Choice, choose_motion
 from .outliers import OUTLIER, guess_spikes
+from .segments import Ending
 from .track_file import measure_scatter
 from .variable_projection import fit_motion
 
@@ -133,7 +134,7 @@ def find_lost_frames(
 
     time (s), depth, error (m): (n,) as they were fitted from ``start`` to ``choice``. Asked where RUN outliers lie side by side
     or the rows scatter more than they say: then every place about them is tried with one frame more, with two, up to
-    MOST_MISSING. Of the MOST_WEIGHED counts that a simple motion likes best the one is taken that all motions do, if it gains
+    MOST_MISSING. Of the MOST_WEIGHED counts that a simple motion likes best motions that rest choose one; it is taken if it gains
     what an outlier costs and what so many trials bring by chance. None otherwise.
     """
     best = choice.best
@@ -149,9 +150,8 @@ def find_lost_frames(
     if len(places) > MOST_PLACES:
         places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))
     keep = ~guess_spikes(depth, error)
-    rough: dict[
-        int, tuple[float, int, tuple[float, float]]
-    ] = {}  # of so many frames: the best place with a simple motion
+    # of so many frames: the best place with a simple motion
+    rough: dict[int, tuple[float, int, tuple[float, float]]] = {}
     for lost in range(1, MOST_MISSING + 1):
         late = lost * spacing
         for place in places:
@@ -160,21 +160,36 @@ def find_lost_frames(
             motion = fit_motion(moved[keep], depth[keep], error[keep], 4, "rest", begin)
             if motion is not None and motion.chi_square < rough.get(lost, (np.inf,))[0]:
                 rough[lost] = motion.chi_square, int(place), begin
-    # a simple motion miscounts: the nearest counts are weighed with every motion
+    # a simple motion miscounts: the nearest counts are weighed with motions that rest, the best of them with all
     near = sorted(rough, key=lambda lost: rough[lost][0])[:MOST_WEIGHED]
-    weighed: list[tuple[float, int, int, Choice]] = []
+    weighed: list[tuple[float, int]] = []
     for lost in near:
-        _, place, begin = rough[lost]
-        moved = time + lost * spacing * (np.arange(len(time)) >= place)
-        chosen = choose_motion(moved, depth, error, begin)
+        chosen = _choose_with_lost(time, depth, error, lost, rough[lost], ("rest",))
         if chosen is not None:
-            weighed.append((chosen.best.judge(1.0), place, lost, chosen))
+            weighed.append((chosen.best.judge(1.0), lost))
     if not weighed:
         return None
-    _, place, lost, better = min(weighed, key=lambda each: each[0])
+    lost = min(weighed)[1]
+    place = rough[lost][1]
+    better = _choose_with_lost(time, depth, error, lost, rough[lost])
+    assert better is not None
     chance = OUTLIER**2 + 2.0 * np.log(len(places) * lost)
     # what is gained counts by the scatter that is left: rows of whole pixels scatter alike with any clock
     noise = max(1.0, better.best.motion.chi_square / max(better.best.motion.freedom, 1))
     if better.best.judge(noise) > best.judge(noise) - chance:
         return None
     return place, lost, better
+
+
+def _choose_with_lost(
+    time: FloatArray,
+    depth: FloatArray,
+    error: FloatArray,
+    lost: int,
+    rough: tuple[float, int, tuple[float, float]],
+    endings: tuple[Ending, ...] = ENDINGS,
+) -> Choice | None:
+    """The motion with so many frames lost where ``rough`` (χ², place, guess of contact and stop) has them."""
+    _, place, begin = rough
+    late = lost * float(np.median(np.diff(time)))
+    return choose_motion(time + late * (np.arange(len(time)) >= place), depth, error, begin, endings)

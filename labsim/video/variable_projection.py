@@ -133,7 +133,7 @@ def fit_motion(
                 break
             gain, moved = cost - better[0], np.max(np.abs(trial - q))
             q, (cost, misfit, linear, matrix, left) = trial, better
-            if (gain < 1e-6 * cost and gain < 1e-3) or moved < 1e-7 * spacing:
+            if gain < max(1e-3, 1e-6 * cost) or moved < 1e-7 * spacing:
                 break
         ends = slope(q, linear)
         jacobian = np.column_stack([ends, matrix]) if opened else order_columns(ends, matrix)

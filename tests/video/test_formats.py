@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
 import tracemalloc
@@ -158,6 +159,15 @@ def test_no_video_is_one_line(tmp_path, name) -> None:
     with pytest.raises(MeasurementError) as trouble:
         list(open_frames(path))
     assert str(path) in str(trouble.value) and "\n" not in str(trouble.value)
+
+
+def test_a_cine_whose_table_points_beyond_any_file(tmp_path: Path) -> None:
+    content = bytearray((DATA / "cine_phantom" / "cine_legacy.cine").read_bytes())
+    (table,) = struct.unpack_from("<I", content, 32)
+    struct.pack_into("<Q", content, table + 8 * 5, (1 << 64) - 3)
+    path = tmp_path / "far.cine"
+    path.write_bytes(content)
+    assert len(list(open_frames(path))) == 5
 
 
 def test_truncated_video_is_said(tmp_path) -> None:

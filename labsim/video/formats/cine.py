@@ -68,7 +68,8 @@ def _open_file(path: Path) -> Frames:
         real_bits = struct.unpack_from("<I", setup, 896)[0] if len(setup) > 900 else depth
         stamps, exposure = _read_tags(file, setup_at + length, table_at, count)
         file.seek(table_at)
-        offsets = np.frombuffer(file.read(8 * count), "<u8")
+        # what lies beyond the file's end is not there, however far
+        offsets = np.minimum(np.frombuffer(file.read(8 * count), "<u8"), size)
         if len(offsets) < count:
             raise MeasurementError(path, "video", "is truncated inside its image table")
     inside = int(np.sum(offsets.astype(float) + image_size <= size))
