@@ -8,49 +8,57 @@ polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.m
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly, make_lsq_spline
+from scipy.interpolate import BSpline, CubicSpline, PPoly
 
-from ..records import FloatArray
+from ..records import STANDARD_GRAVITY, FloatArray
 from ..sph import DropRun
+from ..sph.profile import is_blunt
+from ..sph.tips import make_profile
 from .run_parts import Motion
 
 FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)
 UNIT_SPLINES = np.ascontiguousarray(CubicSpline(FRACTIONS, np.eye(FRACTIONS.size)).c)
-CHANGE = 3  # degree of the polynomial that a small change of the speed up to the stop follows
+CHANGE = 5  # degree of the polynomial that a small change of the speed up to the stop follows
 PIECES = 4  # of the spline through the speed up to the stop
 
 
-def _smooth_to_the_stop() -> FloatArray:
-    """(n, n) from speeds at FRACTIONS to those of a cubic spline of PIECES pieces, fitted up to the stop and met at both ends.
+def _smooth_to_the_stop(blunt: bool) -> tuple[FloatArray, FloatArray]:
+    """(n, n) from speeds at FRACTIONS to those of a cubic spline of PIECES pieces, fitted up to the stop and met at both ends;
+    and (n,) what a slope of one at contact adds, where the matrix has none. A blunt tip meets its whole force there: its slope
+    is fitted too.
 
     The force of a run grows particle by particle; it is known over a quarter of the stop, not over a fortieth.
     """
     inside = FRACTIONS[FRACTIONS <= 1.0]
-    ends = np.repeat([0.0, 1.0], 4)
-    knots = np.sort(np.concatenate([ends, np.linspace(0.0, 1.0, PIECES + 1)[1:-1]]))
+    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, PIECES + 1), [1.0] * 3])
+    basis = BSpline.design_matrix(inside, knots, 3).toarray()
+    slope = np.zeros(FRACTIONS.size)
+    if not blunt:  # the second coefficient less the first, over a third of a piece, is the slope
+        by_slope = basis[:, 1] / (3.0 * PIECES)
+        basis = np.column_stack([basis[:, 0] + basis[:, 1], basis[:, 2:]])
     weights = np.ones(inside.size)
     weights[[0, -1]] = 100.0
+    fitted = basis @ np.linalg.pinv(weights[:, None] * basis) * weights
     whole = np.eye(FRACTIONS.size)
-    whole[: inside.size, : inside.size] = make_lsq_spline(inside, np.eye(inside.size), knots, w=weights)(
-        inside
-    )
-    return whole
+    whole[: inside.size, : inside.size] = fitted
+    if not blunt:
+        slope[: inside.size] = by_slope - fitted @ by_slope
+    return whole, slope
 
 
-SMOOTHED = _smooth_to_the_stop()
-
-
-def _smooth_change() -> FloatArray:
-    """(n, n) from changes at FRACTIONS to those of a polynomial of degree CHANGE, fitted up to the stop."""
+def _smooth_change(blunt: bool) -> FloatArray:
+    """(n, n) from changes at FRACTIONS to those of a polynomial of degree CHANGE, fitted up to the stop; of a tip that is not
+    blunt without a slope at contact."""
     inside = FRACTIONS <= 1.0
-    powers = np.vander(FRACTIONS[inside], CHANGE + 1)
+    powers = FRACTIONS[inside, None] ** np.delete(np.arange(CHANGE + 1), [] if blunt else [1])
     whole = np.eye(FRACTIONS.size)
     whole[np.ix_(inside, inside)] = powers @ np.linalg.pinv(powers)
     return whole
 
 
-SMOOTH_CHANGE = _smooth_change()
+SMOOTHED = {blunt: _smooth_to_the_stop(blunt) for blunt in (False, True)}
+SMOOTH_CHANGE = {blunt: _smooth_change(blunt) for blunt in (False, True)}
 
 
 def encode_run(run: DropRun | Motion) -> FloatArray:
@@ -61,10 +69,27 @@ def encode_run(run: DropRun | Motion) -> FloatArray:
 
 def encode_speeds(run: DropRun | Motion) -> FloatArray:
     """(2 + len(FRACTIONS),): ln D, ln T_s and the speeds of one run in D/T_s, whose differences are accelerations: the second
-    difference of stored depths would show the straight lines between them. Smooth up to the stop: SMOOTHED."""
+    difference of stored depths would show the straight lines between them. Smooth up to the stop: SMOOTHED.
+
+    Where a tip that is not blunt meets the dust it still falls freely: a force that began with a jump would move contact."""
     speed = np.interp(FRACTIONS * run.stopping_time, run.time, run.velocity)
     depth, stop = run.penetration_depth, run.stopping_time
-    return np.concatenate([[np.log(depth), np.log(stop)], SMOOTHED @ speed * stop / depth])
+    smoothed, sloped = SMOOTHED[is_blunt(make_profile(run.setting.projectile))]
+    shape = smoothed @ speed * stop / depth + sloped * run.setting.gravity * stop**2 / depth
+    return np.concatenate([[np.log(depth), np.log(stop)], shape])
+
+
+def smooth_change(code: FloatArray, moved: FloatArray, blunt: bool) -> FloatArray:
+    """``moved``, a code of speeds, its difference from ``code`` up to the stop a polynomial.
+
+    The difference of two rough forces is as rough as they are, and a law without a name would fit data with it."""
+    slope = np.zeros(FRACTIONS.size)
+    if not blunt:
+        slope = (
+            FRACTIONS * STANDARD_GRAVITY * (np.exp(2 * moved[1] - moved[0]) - np.exp(2 * code[1] - code[0]))
+        )
+    shape = code[2:] + slope + SMOOTH_CHANGE[blunt] @ ((moved - code)[2:] - slope)
+    return np.concatenate([moved[:2], shape])
 
 
 def decode_speed(code: FloatArray, time: FloatArray) -> FloatArray:

@@ -32,7 +32,8 @@ COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than wha
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
-FELT_CELLS = 8  # of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration_error.py)
+# of drops with an accelerometer, of fingerprints too: the force needs more than the depth does (benchmarks/acceleration_error.py)
+FELT_CELLS = 8
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
 
 Change = Callable[[DropSetting], DropSetting]
@@ -206,8 +207,8 @@ class RunGrid:
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
-        usual = max(self.cells, FELT_CELLS) if family.felt else self.cells
-        own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else cells or usual
+        usual = max(self.cells, FELT_CELLS) if family.felt else cells or self.cells
+        own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else usual
         setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
         if family.pushed:
             setting = set_push(setting, speed)

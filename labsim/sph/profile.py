@@ -90,6 +90,12 @@ def has_shaft(profile: FloatArray) -> bool:
     return bool(np.isinf(profile[-1, LENGTH]))
 
 
+def is_blunt(profile: FloatArray) -> bool:
+    """Whether a face, not a point, meets the dust first."""
+    first = profile[0]
+    return bool(first[BENT] == 0.0 and first[FIRST_R] == 0.0 and first[LENGTH] > 0.0)
+
+
 def outline(profile: FloatArray, height: float, points: int = 60) -> tuple[FloatArray, FloatArray]:
     """r and z (m) along the surface, cut at ``height`` above the lowest point; ``points`` on each arc."""
     r, z = [0.0], [0.0]

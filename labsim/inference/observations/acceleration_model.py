@@ -18,7 +18,9 @@ import numpy as np
 
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
-from ..curves import SMOOTH_CHANGE, decode_speed
+from ...sph.profile import is_blunt
+from ...sph.tips import make_profile
+from ..curves import decode_speed, smooth_change
 from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
@@ -32,7 +34,8 @@ FORCE_NOISE, FORCE_LENGTH = 0.004, 4.0 / BINS  # the second of the stopping time
 FORCE_SHAPE, SHAPE_LENGTH = 0.015, 0.15
 FORCE_REACH = 0.5  # e-folds of depth over tip radius in which the smooth part changes
 USUAL_DEPTH, ROUGHER = 0.8, 1.0
-FORCE_AT_CONTACT, FORCE_LATE = 0.013, 0.02
+FORCE_AT_CONTACT, FORCE_LATE = 0.005, 0.02
+SHORT = 0.05  # of a stretch, over which a slope is taken
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
 
 
@@ -43,6 +46,7 @@ class AccelerationModel:
     observed: ObservedImpact
     table: ResponseTable
     start: Instant
+    blunt: bool  # the tip has a face
     camera: None = None
     unit: str = "m/s^2"
 
@@ -102,9 +106,10 @@ class AccelerationModel:
         return STANDARD_GRAVITY - (after - before) / (end - begin)
 
     def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
-        """Derivative of ``predict`` by the contact time, m/s³, over a stretch to either side: the force begins inside one, and a
-        slope taken there alone points a contact that is late away from the data."""
-        step = float(np.median(self.observed.end - self.observed.begin))
+        """Derivative of ``predict`` by the contact time, m/s³. A blunt tip's force begins with a jump inside a stretch: a slope
+        taken there alone would point a contact that is late away from the data, and is taken over a stretch to either side."""
+        stretch = float(np.median(self.observed.end - self.observed.begin))
+        step = stretch if self.blunt else SHORT * stretch
         late = instant._replace(contact_time=instant.contact_time + step)
         early = instant._replace(contact_time=instant.contact_time - step)
         return (self.predict(code, instrument, late) - self.predict(code, instrument, early)) / (2 * step)
@@ -127,17 +132,15 @@ class AccelerationModel:
         """Errors with one value for all drops: the scale of each sensor. It acts on what the sensor puts out."""
         accelerometer = self.observed.drop.accelerometer
         assert accelerometer is not None
-        output = here - STANDARD_GRAVITY + accelerometer.reads_at_rest
+        output = self.data - STANDARD_GRAVITY + accelerometer.reads_at_rest
         return {
             f"scale {each.column} {each.range:g}": output * self.observed.sensors[:, k] * each.scale_sigma
             for k, each in enumerate(accelerometer.sensors)
         }
 
     def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """``moved``, its difference from ``code`` up to the stop a polynomial.
-
-        The difference of two rough forces is as rough as they are, and a law without a name would fit data with it."""
-        return np.concatenate([moved[:2], code[2:] + SMOOTH_CHANGE @ (moved - code)[2:]])
+        """``moved``, its difference from ``code`` as smooth as the solver knows it."""
+        return smooth_change(code, moved, self.blunt)
 
     def share_solver(
         self, here: FloatArray, clock: FloatArray, stop: float, reach: float
@@ -145,12 +148,11 @@ class AccelerationModel:
         """What the solver's force is off by in all drops: as the tip meets the dust, and later where it goes deeper.
 
         clock : (n,) s since contact; stop : s; reach : ln of depth over tip radius."""
-        peak = float(np.max(np.abs(here)))
         inside = self._share_inside(clock) * (clock < stop)
         fraction = np.maximum(clock, 0.0) / stop
         return {
-            "force at contact": FORCE_AT_CONTACT * peak * inside * np.exp(-fraction / 0.05),
-            "force late": FORCE_LATE * peak * reach * inside * (2.0 * fraction - 1.0),
+            "force at contact": FORCE_AT_CONTACT * self._peak * inside * np.exp(-fraction / 0.05),
+            "force late": FORCE_LATE * self._peak * reach * inside * (2.0 * fraction - 1.0),
         }
 
     def _share_inside(self, clock: FloatArray) -> FloatArray:
@@ -165,27 +167,34 @@ class AccelerationModel:
         longer[:2] += 1e-3
         return (self.predict(longer, instrument, instant) - here) / 1e-3
 
-    def _find_scale(self, here: FloatArray, final: float) -> float:
-        """What the errors of the force are shares of, m/s²; final : depth (m)."""
-        return float(np.max(np.abs(here))) * (USUAL_DEPTH * self.radius / final) ** ROUGHER
+    @property
+    def _scale(self) -> float:
+        """What the errors of the force are shares of, m/s². By the record, not by the run: errors that shrink with the simulated
+        force would be a reason for softer dust."""
+        return self._peak * (USUAL_DEPTH * self.radius / self.deepest) ** ROUGHER
+
+    @property
+    def _peak(self) -> float:
+        return float(np.max(np.abs(self.data)))
 
     def find_solver_noise(self, here: FloatArray, stop: float, final: float) -> FloatArray:
         """(n, n) root of the covariance of what is particle noise in the force, by columns."""
         observed = self.observed
+        stop = float(observed.impact.time[-1])
         width = observed.end - observed.begin
         shares = np.sqrt(stop / BINS / np.minimum(width, stop))
         sigma = np.where(observed.end > observed.contact_time - 0.5 * stop / BINS, shares, 0.0)
         middle = 0.5 * (observed.begin + observed.end) / (FORCE_LENGTH * stop)
         apart = math.sqrt(3.0) * np.abs(np.subtract.outer(middle, middle))
         alike = FORCE_NOISE**2 * (1.0 + apart) * np.exp(-apart) + FORCE_ROUGHNESS**2 * np.eye(middle.size)
-        return np.asarray(self._find_scale(here, final) * sigma[:, None] * np.linalg.cholesky(alike))
+        return np.asarray(self._scale * sigma[:, None] * np.linalg.cholesky(alike))
 
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
     ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in drops that go alike deep, m/s²; over which share of the stopping time, and over how many
         e-folds of depth over tip radius, that changes."""
-        size = np.hypot(share * np.maximum(here, 0.0), FORCE_SHAPE * self._find_scale(here, final))
+        size = np.hypot(share * np.maximum(self.data, 0.0), FORCE_SHAPE * self._scale)
         return self._share_inside(clock) * size, SHAPE_LENGTH, FORCE_REACH
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
@@ -211,6 +220,5 @@ def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatA
 
 
 def make_acceleration_model(observed: ObservedImpact, table: ResponseTable) -> AccelerationModel:
-    return AccelerationModel(
-        observed, table, Instant(observed.contact_time, math.log(observed.impact_speed), 0.0)
-    )
+    start = Instant(observed.contact_time, math.log(observed.impact_speed), 0.0)
+    return AccelerationModel(observed, table, start, is_blunt(make_profile(observed.drop.projectile)))
