@@ -47,6 +47,8 @@ def measure_alikeness(residual: FloatArray, fitted: int) -> float:
         return 1.0
     centred = residual - residual.mean()
     total = float(np.sum(centred**2))
+    if total == 0.0:
+        return 1.0
     growth, first = 1.0, 0.0
     for lag in range(1, min(MOST_LAGS, n // 4) + 1):
         correlation = float(np.sum(centred[lag:] * centred[:-lag])) / total

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured
+from .checks import measure_alikeness
 from .frames import Frames
 from .outline import Outline
 
@@ -69,7 +70,9 @@ def straighten(
         slope, offset = np.polyfit(row[keep], x[keep], 1)
         misfit = x - slope * row - offset
         keep = good & (np.abs(misfit) < 4 * max(1.4826 * float(np.median(np.abs(misfit[keep]))), 0.02))
-    spread = float(np.std(misfit[keep])) / (np.std(row[keep]) * np.sqrt(max(keep.sum() - 2, 1)))
+    # what a codec, or air, does to a frame it does to its neighbours: the slope knows less than so many frames would tell
+    alike = float(np.sqrt(measure_alikeness(misfit[keep], 2)))
+    spread = alike * float(np.std(misfit[keep])) / (np.std(row[keep]) * np.sqrt(max(keep.sum() - 2, 1)))
     angle = float(np.arctan(slope))
     if level is not None and abs(angle) > np.radians(0.3) and abs(level - angle) > abs(angle) / 2:
         if abs(slope) > 5 * spread:

@@ -16,6 +16,7 @@ import pytest
 from labsim.errors import MeasurementError
 from labsim.records import Camera
 from labsim.video import fit_deceleration, follow_projectile, open_frames
+from labsim.video.direction import straighten
 from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
 
 DATA = Path(__file__).parents[2] / "data" / "video"
@@ -430,3 +431,18 @@ def test_frames_that_are_left_out() -> None:
     assert {reason for reason in seen.track.reason if reason} == {"left out in drop.toml"}
     with pytest.raises(MeasurementError, match=r"frames_left_out: 3 is no frame.*1000 to 1089"):
         follow_projectile(make_frames(pictures, numbers=np.arange(90) + 1000), left_out=(3,))
+
+
+def test_the_cameras_rotation_knows_that_neighbouring_frames_err_alike() -> None:
+    """Errors of x that last for some twenty frames, in 200 tracks: the pulls of the angle are about one, not four."""
+    rng = np.random.default_rng(4)
+    row, pulls = np.linspace(50.0, 400.0, 240), []
+    for _ in range(200):
+        x = np.zeros(240)
+        for i in range(1, 240):
+            x[i] = 0.9 * x[i - 1] + 0.1 * rng.normal()
+        _, angle = straighten(row, x + 100.0, np.ones(240, bool), 5.0, 300.0, None, [])
+        assert angle is not None
+        pulls.append(angle.value / angle.sigma)
+    assert 0.7 < np.std(pulls) < 1.5
+    assert straighten(row, np.full(240, 100.0), np.ones(240, bool), 5.0, 300.0, None, [])[1] is not None
