@@ -78,9 +78,10 @@ def read_hidden(truth: dict) -> dict[str, tuple[float, float | None]]:
     terms = truth["mat"] | truth["dyn"] | truth["measure"] | truth["ct"]
     exponent = terms.pop("raten", None)
     values: dict[str, tuple[float, float | None]] = {}
-    if "side" in terms:  # told in words, per length of a 1 mm rod
-        del terms["side"]
-        values["side_friction"] = float(re.search(r"([\d.]+) N/m", truth["note"])[1]), None
+    if "side" in terms:  # the shared campaigns tell it in words, per length of a 1 mm rod
+        told = re.search(r"([\d.]+) N/m", truth["note"])
+        side = terms.pop("side")
+        values["side_friction"] = float(told[1]) if told else side, None
     if truth["drift"]:
         values["sample_drift"] = truth["drift"], None
     if truth["profile"]:

@@ -25,25 +25,24 @@ PIECES = 4  # of the spline through the speed up to the stop
 
 def _smooth_to_the_stop(blunt: bool) -> tuple[FloatArray, FloatArray]:
     """(n, n) from speeds at FRACTIONS to those of a cubic spline of PIECES pieces, fitted up to the stop and met at both ends;
-    and (n,) what a slope of one at contact adds, where the matrix has none. A blunt tip meets its whole force there: its slope
-    is fitted too.
+    and (n,) what a slope of one at contact adds, where the matrix has none: nothing for a blunt tip, which meets its whole
+    force there and whose slope is fitted.
 
     The force of a run grows particle by particle; it is known over a quarter of the stop, not over a fortieth.
     """
     inside = FRACTIONS[FRACTIONS <= 1.0]
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, PIECES + 1), [1.0] * 3])
     basis = BSpline.design_matrix(inside, knots, 3).toarray()
-    slope = np.zeros(FRACTIONS.size)
-    if not blunt:  # the second coefficient less the first, over a third of a piece, is the slope
-        by_slope = basis[:, 1] / (3.0 * PIECES)
+    # the second coefficient less the first, over a third of a piece, is the slope
+    by_slope = basis[:, 1] / (3.0 * PIECES)
+    if not blunt:
         basis = np.column_stack([basis[:, 0] + basis[:, 1], basis[:, 2:]])
     weights = np.ones(inside.size)
     weights[[0, -1]] = 100.0
     fitted = basis @ np.linalg.pinv(weights[:, None] * basis) * weights
-    whole = np.eye(FRACTIONS.size)
+    whole, slope = np.eye(FRACTIONS.size), np.zeros(FRACTIONS.size)
     whole[: inside.size, : inside.size] = fitted
-    if not blunt:
-        slope[: inside.size] = by_slope - fitted @ by_slope
+    slope[: inside.size] = by_slope - fitted @ by_slope
     return whole, slope
 
 
@@ -83,11 +82,8 @@ def smooth_change(code: FloatArray, moved: FloatArray, blunt: bool) -> FloatArra
     """``moved``, a code of speeds, its difference from ``code`` up to the stop a polynomial.
 
     The difference of two rough forces is as rough as they are, and a law without a name would fit data with it."""
-    slope = np.zeros(FRACTIONS.size)
-    if not blunt:
-        slope = (
-            FRACTIONS * STANDARD_GRAVITY * (np.exp(2 * moved[1] - moved[0]) - np.exp(2 * code[1] - code[0]))
-        )
+    before, after = (STANDARD_GRAVITY * np.exp(2 * each[1] - each[0]) for each in (code, moved))
+    slope = (after - before) * FRACTIONS
     shape = code[2:] + slope + SMOOTH_CHANGE[blunt] @ ((moved - code)[2:] - slope)
     return np.concatenate([moved[:2], shape])
 

@@ -33,8 +33,7 @@ from .tangents import Blocks, linearise_at
 from .workbench import Workbench
 
 Hypothesis = tuple[str, ...]
-# a fit has this many steps; beyond PATIENT each has to gain more than LOWER. Records of acceleration, steep in the contact time,
-# take some twenty
+# a fit has this many steps; beyond PATIENT each has to gain more than LOWER
 ITERATIONS, PATIENT = 40, 12
 # p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
 # looked for where that costs nothing; below the second it fails, and runs are made to find out why

@@ -14,7 +14,6 @@ from ..records import FloatArray
 from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
 from .segments import HIGHEST_DEGREE, Ending, Motion
 
-ENDINGS: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce")
 AFTER_END = 3  # frames used beyond the end of the deceleration
 LEAST_STRIDE = 4  # frames over which a speed is guessed
 ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
@@ -120,7 +119,7 @@ def choose_motion(
     depth: FloatArray,
     error: FloatArray,
     start: tuple[float, float],
-    endings: tuple[Ending, ...] = ENDINGS,
+    endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce"),
 ) -> Choice | None:
     """Every model that explains the rows, weighed by Schwarz's criterion (Kass & Raftery 1995); None if none does.
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..records import FloatArray
-from .choosing import ENDINGS, Choice, choose_motion
+from .choosing import Choice, choose_motion
 from .outliers import OUTLIER, guess_spikes
-from .segments import Ending
 from .track_file import measure_scatter
 from .variable_projection import fit_motion
 
@@ -150,8 +149,8 @@ def find_lost_frames(
     if len(places) > MOST_PLACES:
         places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))
     keep = ~guess_spikes(depth, error)
-    # of so many frames: the best place with a simple motion
-    rough: dict[int, tuple[float, int, tuple[float, float]]] = {}
+    # of so many frames: χ², place, times and first guess of the best simple motion
+    rough: dict[int, tuple[float, int, FloatArray, tuple[float, float]]] = {}
     for lost in range(1, MOST_MISSING + 1):
         late = lost * spacing
         for place in places:
@@ -159,19 +158,19 @@ def find_lost_frames(
             begin = start[0] + late * (start[0] >= time[place]), start[1] + late * (start[1] >= time[place])
             motion = fit_motion(moved[keep], depth[keep], error[keep], 4, "rest", begin)
             if motion is not None and motion.chi_square < rough.get(lost, (np.inf,))[0]:
-                rough[lost] = motion.chi_square, int(place), begin
+                rough[lost] = motion.chi_square, int(place), moved, begin
     # a simple motion miscounts: the nearest counts are weighed with motions that rest, the best of them with all
-    near = sorted(rough, key=lambda lost: rough[lost][0])[:MOST_WEIGHED]
     weighed: list[tuple[float, int]] = []
-    for lost in near:
-        chosen = _choose_with_lost(time, depth, error, lost, rough[lost], ("rest",))
-        if chosen is not None:
-            weighed.append((chosen.best.judge(1.0), lost))
+    for lost in sorted(rough, key=lambda lost: rough[lost][0])[:MOST_WEIGHED]:
+        _, _, moved, begin = rough[lost]
+        resting = choose_motion(moved, depth, error, begin, ("rest",))
+        if resting is not None:
+            weighed.append((resting.best.judge(1.0), lost))
     if not weighed:
         return None
     lost = min(weighed)[1]
-    place = rough[lost][1]
-    better = _choose_with_lost(time, depth, error, lost, rough[lost])
+    _, place, moved, begin = rough[lost]
+    better = choose_motion(moved, depth, error, begin)
     assert better is not None
     chance = OUTLIER**2 + 2.0 * np.log(len(places) * lost)
     # what is gained counts by the scatter that is left: rows of whole pixels scatter alike with any clock
@@ -179,17 +178,3 @@ def find_lost_frames(
     if better.best.judge(noise) > best.judge(noise) - chance:
         return None
     return place, lost, better
-
-
-def _choose_with_lost(
-    time: FloatArray,
-    depth: FloatArray,
-    error: FloatArray,
-    lost: int,
-    rough: tuple[float, int, tuple[float, float]],
-    endings: tuple[Ending, ...] = ENDINGS,
-) -> Choice | None:
-    """The motion with so many frames lost where ``rough`` (χ², place, guess of contact and stop) has them."""
-    _, place, begin = rough
-    late = lost * float(np.median(np.diff(time)))
-    return choose_motion(time + late * (np.arange(len(time)) >= place), depth, error, begin, endings)

@@ -58,7 +58,7 @@ def test_an_accelerometer_stands_beside_cameras(tmp_path: Path) -> None:
     kinds = [isinstance(model, AccelerationModel) for model in sound.bench.tracks.models]
     assert kinds == [True, False] * 3
     assert low < 1300.0 < high and sound.p_value > 0.05
-    assert spoilt.fit.chi_square > sound.fit.chi_square + 5.0**2
+    assert spoilt.fit.chi_square > sound.fit.chi_square + 7.0**2
 
 
 def test_errors_of_an_acceleration_integrate_to_depths(tmp_path: Path) -> None:
@@ -188,5 +188,5 @@ def test_a_change_of_a_rough_force_is_smooth(blunt: bool) -> None:
     for change, comes in ((cubic, 1.0), (rough, 0.0)):
         moved = code + np.concatenate([[0.0, 0.0], change])
         left = (smooth_change(code, moved, blunt) - code)[2:] - comes * change
-        assert np.std(left[inside]) < (1e-10 if comes else 0.3 * np.std(rough[inside]))
-        np.testing.assert_allclose(left[~inside], 0.0 if comes else left[~inside], atol=1e-10)
+        assert np.std(left[inside]) < (1e-10 if comes else 0.25 * np.std(rough[inside]))
+        np.testing.assert_allclose(left[~inside], 0.0, atol=1e-10)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from ..observe_acceleration import BINS, ObservedImpact
 # smoothed force (curves.py), interpolated between nodes, is off from a Lagrangian mesh (benchmarks/acceleration_error.py). The
 # fewer particles a tip passes the rougher its force: all but the last two grow as the depth to the power -ROUGHER. A drop has for
 # itself a part without memory and one of Matérn's 3/2; a smooth part is alike in drops that go alike deep; two are in all drops.
-# The sizes are larger than the benchmark's by half: with those, 10 of 30 campaigns of the mesh showed a cause that was not there.
+# The sizes are larger than the benchmark's by half (docs/acceleration-accuracy.md; benchmarks/acceleration_sizes.py).
 FORCE_ROUGHNESS = 0.004
 FORCE_NOISE, FORCE_LENGTH = 0.004, 4.0 / BINS  # the second of the stopping time
 FORCE_SHAPE, SHAPE_LENGTH = 0.015, 0.15
@@ -127,7 +128,7 @@ class AccelerationModel:
         return np.column_stack([np.zeros(self.data.size), self.observed.sensors * sigma])
 
     def share(
-        self, differ: Callable[[str], FloatArray], here: FloatArray, sizes: tuple[float, float, float]
+        self, differ: Callable[[str], FloatArray], sizes: tuple[float, float, float]
     ) -> dict[str, FloatArray]:
         """Errors with one value for all drops: the scale of each sensor. It acts on what the sensor puts out."""
         accelerometer = self.observed.drop.accelerometer
@@ -142,9 +143,7 @@ class AccelerationModel:
         """``moved``, its difference from ``code`` as smooth as the solver knows it."""
         return smooth_change(code, moved, self.blunt)
 
-    def share_solver(
-        self, here: FloatArray, clock: FloatArray, stop: float, reach: float
-    ) -> dict[str, FloatArray]:
+    def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
         """What the solver's force is off by in all drops: as the tip meets the dust, and later where it goes deeper.
 
         clock : (n,) s since contact; stop : s; reach : ln of depth over tip radius."""
@@ -177,7 +176,8 @@ class AccelerationModel:
     def _peak(self) -> float:
         return float(np.max(np.abs(self.data)))
 
-    def find_solver_noise(self, here: FloatArray, stop: float, final: float) -> FloatArray:
+    @cached_property
+    def solver_noise(self) -> FloatArray:
         """(n, n) root of the covariance of what is particle noise in the force, by columns."""
         observed = self.observed
         stop = float(observed.impact.time[-1])

@@ -108,7 +108,7 @@ class DropModel:
         return np.full((self.matrix.shape[0], 1), self.surface_sigma)
 
     def share(
-        self, differ: Callable[[str], FloatArray], here: FloatArray, sizes: tuple[float, float, float]
+        self, differ: Callable[[str], FloatArray], sizes: tuple[float, float, float]
     ) -> dict[str, FloatArray]:
         """Errors with one value for several drops; sizes : of pixel size, frame rate and the offset of the contact."""
         camera = f"{self.observed.pixel:.6g} {self.camera.frame_rate:.6g}"
@@ -116,7 +116,7 @@ class DropModel:
         return {
             f"pixel {camera}": differ("pixel_factor") * pixel,
             f"frame {camera}": differ("rate_factor") * rate,
-            "contact offset": np.full(here.size, contact * self.radius),
+            "contact offset": np.full(self.data.size, contact * self.radius),
         }
 
     unit = "m"
@@ -125,9 +125,7 @@ class DropModel:
         """Depths are smooth."""
         return moved
 
-    def share_solver(
-        self, here: FloatArray, clock: FloatArray, stop: float, reach: float
-    ) -> dict[str, FloatArray]:
+    def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
         """Nothing beside what all records have."""
         return {}
 
@@ -137,9 +135,10 @@ class DropModel:
         """What the solver may be off by a share of from shallow to deep drops, m."""
         return np.maximum(here, 0.0)
 
-    def find_solver_noise(self, here: FloatArray, stop: float, final: float) -> FloatArray:
+    @property
+    def solver_noise(self) -> FloatArray:
         """(n, 0): depths have none that is not smooth."""
-        return np.zeros((here.size, 0))
+        return np.zeros((self.data.size, 0))
 
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float

@@ -141,9 +141,7 @@ def linearise_drop(
         by_strength * max(scatter, LEAST_SCATTER),
     ]
     final, stop = np.exp(code[0]), np.exp(code[1])
-    local = np.column_stack(
-        [*columns, zeros[:, 1:], model.find_solver_noise(here, float(stop), float(final))]
-    )
+    local = np.column_stack([*columns, zeros[:, 1:], model.solver_noise])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
 
@@ -156,8 +154,8 @@ def linearise_drop(
     reach = float(code[0]) - math.log(model.radius)
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
-        **model.share(differ, here, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
-        **model.share_solver(here, clock, float(stop), reach),
+        **model.share(differ, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
+        **model.share_solver(clock, float(stop), reach),
         "numerical slope": model.slope(code, instrument, instant, here)
         * (reach - USUAL_DEPTH)
         * terms.numerical_slope,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -109,7 +110,7 @@ class PushModel:
         return np.column_stack([np.zeros(self.data.size), offset / np.exp(self.data)])
 
     def share(
-        self, differ: Callable[[str], FloatArray], here: FloatArray, sizes: tuple[float, float, float]
+        self, differ: Callable[[str], FloatArray], sizes: tuple[float, float, float]
     ) -> dict[str, FloatArray]:
         """Errors with one value for all records: the profile, window by window, and the scale of the gauge."""
         gauge = self.observed.drop.gauge
@@ -126,9 +127,7 @@ class PushModel:
         """Depths are smooth."""
         return moved
 
-    def share_solver(
-        self, here: FloatArray, clock: FloatArray, stop: float, reach: float
-    ) -> dict[str, FloatArray]:
+    def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
         """Nothing beside what all records have."""
         return {}
 
@@ -138,7 +137,8 @@ class PushModel:
         """What the solver may be off by from shallow to deep drops: it is pushed to one depth."""
         return np.zeros(self.data.size)
 
-    def find_solver_noise(self, here: FloatArray, stop: float, final: float) -> FloatArray:
+    @cached_property
+    def solver_noise(self) -> FloatArray:
         """(n, n) root of the covariance of the ground's own differences, by columns."""
         apart = np.abs(np.subtract.outer(self.observed.depth, self.observed.depth))
         alike = np.exp(-apart / self.ground.length) + 1e-9 * np.eye(self.data.size)
