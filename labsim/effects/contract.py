@@ -86,6 +86,10 @@ class Parameter:
         whole = self._whole
         return whole[0] * math.expm1(grade / whole[1]) if whole else grade
 
+    def stretch(self, times: float) -> Parameter:
+        """The same parameter with a step that is ``times`` as long by its grade, kept inside the limits."""
+        return replace(self, step=self.hold(self.amplitude_at(times * self.grade(self.step))) - self.null)
+
     @property
     def _whole(self) -> tuple[float, float] | None:
         """The amplitude that doubles what it acts on, and the unit of grades, where these are logarithms."""
@@ -215,6 +219,12 @@ class Effect:
     def amplitudes(self) -> tuple[Parameter, ...]:
         """The parameters that decide whether the effect is on."""
         return tuple(parameter for parameter in self.parameters if not parameter.shape)
+
+    def stretch(self, times: float) -> Effect:
+        """The same effect with longer steps to its tangents, where runs are rough."""
+        return replace(
+            self, parameters=tuple(each if each.shape else each.stretch(times) for each in self.parameters)
+        )
 
     def with_shape(self, value: float) -> Effect:
         """The effect with another default of its (first) shape parameter, and amplitudes that do as much with it."""

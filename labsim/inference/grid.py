@@ -34,6 +34,9 @@ PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance 
 INERTIA = 0.005  # ρ v² of a push over its resistance
 # of drops with an accelerometer, of fingerprints too: the force needs more than the depth does (benchmarks/acceleration_error.py)
 FELT_CELLS = 8
+# longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
+# (benchmarks/effect_roughness.py)
+FELT_STEPS = 4.0
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
 
 Change = Callable[[DropSetting], DropSetting]

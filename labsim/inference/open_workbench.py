@@ -14,9 +14,11 @@ from ..effects.terms import apply_law
 from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..sph import DropSetting
-from .curves import encode_run, encode_speeds
+from ..sph.profile import is_blunt
+from ..sph.tips import make_profile
+from .curves import encode_run, encode_speeds, smooth_change
 from .forward import ResponseTable
-from .grid import PUSH_RATIO, SPEED_RATIO, Family, RunGrid, few_positions, speed_nodes
+from .grid import FELT_STEPS, PUSH_RATIO, SPEED_RATIO, Family, RunGrid, few_positions, speed_nodes
 from .observations import Observation, RunFeatures, observe_further
 from .observations.acceleration_model import make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
@@ -96,7 +98,8 @@ def open_workbench(
         families.append(Family(projectile, nodes, False, few, felt=felt))
         speeds = ResponseTable(np.log(nodes), few)
         if felt:
-            of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
+            smooth = partial(smooth_change, blunt=is_blunt(make_profile(projectile)))
+            of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds, smooth))
         models += [
             make_acceleration_model(drop, speeds)
             if isinstance(drop, ObservedImpact)
@@ -126,7 +129,9 @@ def open_workbench(
         if reason:
             reasons[name] = reason
         else:
-            resolved[name] = effect.for_campaign(campaign)
+            known = effect.for_campaign(campaign)
+            rough = known.kind != "numerics" and any(family.felt for family in families)
+            resolved[name] = known.stretch(FELT_STEPS) if rough else known
     grid = RunGrid(campaign, store, families, workers=workers, scheduler=scheduler, progress=progress)
     if cells:
         grid.cells = cells
