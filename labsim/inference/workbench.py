@@ -134,7 +134,7 @@ class Workbench:
         parameter = effect.amplitudes[0]
         setting = self.state(self.families[0])
         place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
-        changed = effect.apply(setting, {parameter.name: parameter.null + parameter.step}, place)
+        changed = effect.apply(setting, {parameter.name: parameter.hold(parameter.step)}, place)
         back = changed.replace(material=set_value(changed.material, read_value(setting.material)))
         return back == setting
 
