@@ -7,6 +7,7 @@ written; every mistake is a CampaignError that names file, key, value and remedy
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,7 @@ def read_campaign(folder: Path | str) -> Campaign:
         raise CampaignError(folder / "drops", "", "holds no drop; add drops/D01/drop.toml")
     read_scans = [read_scan(path) for path in list_parts(folder / "ct", "scan.toml")]
     scans = tuple(scan for scan in read_scans if isinstance(scan, Scan))
+    drops = _join_records(folder, drops)
     _check_sequence(folder, drops)
     strength_tests = read_strength_tests(folder, sample)
     refuse_repeated_records(folder, drops, scans, strength_tests)
@@ -115,7 +117,8 @@ def read_drop(path: Path | str, *, given: Mapping[str, Mapping[str, Any]] | None
     motion = read_motion(document.table("motion", required=False), campaign, file.parent)
     projectile = read_projectile(document.table("projectile"), campaign, led=motion.kind != "free")
     drop = document.table("drop", required=kind != "summary")
-    sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" else drop.number(
+    same_as = drop.text("same_as", default="")
+    sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" or same_as else drop.number(
         "sequence", 0, 100000, whole=True
     )  # fmt: skip
     height = drop.measured(
@@ -193,6 +196,7 @@ def read_drop(path: Path | str, *, given: Mapping[str, Mapping[str, Any]] | None
         impact_speed=speed,
         gauge=gauge,
         position=position,
+        same_as=same_as,
     )
 
 
@@ -213,6 +217,8 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
     kinds: dict[str, int] = {}
     for drop in campaign.drops:
         kinds[drop.record.kind] = kinds.get(drop.record.kind, 0) + 1
+    made = [drop for drop in campaign.drops if not drop.same_as]
+    twice = len(campaign.drops) - len(made)
     radii = sorted({drop.projectile.tip_radius for drop in campaign.drops})
     assumed = [f"{d.name}: {d.source['assumed']}" for d in campaign.drops if d.source.get("assumed")]
     low, high = campaign.p_m_range
@@ -224,7 +230,8 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         f"  model: {campaign.geometry}, gravity {campaign.gravity:g} m/s², "
         + ("" if campaign.material.law == DUST else f"law {Path(campaign.material.law).stem}, ")
         + f"{campaign.calibrated} between {low / 1e3:g} and {high / 1e3:g} kPa",
-        f"  {_count(campaign.drops, 'drop')} (" + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) + "), tip radii "
+        f"  {_count(made, 'drop')} (" + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items()))
+        + (f", {twice} of them by two instruments" if twice else "") + "), tip radii "
         + ", ".join(f"{r * 1e3:g} mm" for r in radii),
         f"  {_count(campaign.scans, 'CT scan')} with slices, "
         f"{_count(campaign.published_scans, 'published compaction figure')}",
@@ -237,7 +244,7 @@ def describe_campaign(campaign: Campaign) -> dict[str, Any]:
         )
     return {
         "campaign": campaign.name,
-        "drops": len(campaign.drops),
+        "drops": len(made),
         "kinds": kinds,
         "scans": len(campaign.scans),
         "published_scans": len(campaign.published_scans),
@@ -289,9 +296,37 @@ def _check_track(path: Path, camera: Camera) -> None:
         )
 
 
+def _join_records(folder: Path, drops: tuple[Drop, ...]) -> tuple[Drop, ...]:
+    """Give another record of a drop (``same_as``) the drop's own place in the sequence. Raises CampaignError."""
+    by_name = {drop.name: drop for drop in drops}
+    joined = []
+    for drop in drops:
+        if drop.same_as:
+            file, first = folder / "drops" / drop.name / "drop.toml", by_name.get(drop.same_as)
+            if first is None or first.same_as or first is drop:
+                raise CampaignError(
+                    file, "drop.same_as", f'"{drop.same_as}" is no other drop with a sequence of its own'
+                )
+            if drop.projectile != first.projectile or drop.motion != first.motion:
+                raise CampaignError(
+                    file, "[projectile]", f"is not that of {first.name}, of which this is another record"
+                )
+            if drop.record.kind == first.record.kind:
+                raise CampaignError(
+                    file,
+                    "record.kind",
+                    f'is "{drop.record.kind}" as in {first.name}; another record of a drop is by another instrument',
+                )
+            drop = replace(drop, sequence=first.sequence)
+        joined.append(drop)
+    return tuple(joined)
+
+
 def _check_sequence(folder: Path, drops: tuple[Drop, ...]) -> None:
     seen: dict[int, str] = {}
     for drop in drops:
+        if drop.same_as:
+            continue
         if drop.sequence and drop.sequence in seen:
             raise CampaignError(
                 folder / "drops" / drop.name / "drop.toml",

@@ -232,6 +232,12 @@ class Drop:
     impact_speed: Measured | None = None  # m/s, where it was measured beside the record
     gauge: Gauge | None = None
     position: tuple[float, float] | None = None  # m, east and north, where the place of a push matters
+    same_as: str = ""  # the drop of which this is another record, by another instrument
+
+    @property
+    def sample(self) -> str:
+        """Name of the dust that was hit: two records of one drop have it in common."""
+        return self.same_as or self.name
 
 
 @dataclass(frozen=True)

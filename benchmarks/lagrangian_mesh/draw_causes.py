@@ -3,28 +3,39 @@
     python benchmarks/lagrangian_mesh/make_campaigns.py FOLDER --plan fresh.toml --only f51,f52
     python benchmarks/lagrangian_mesh/draw_causes.py FOLDER f51,f52 --first 71 --seed 20261125 > more.toml
 
-The campaigns named have nothing hidden. Each is screened, which says how large every cause has to be to leave a trace of SIGMAS
-standard deviations beside p_m; one is drawn whose size lies inside its limits and the plan's twin has it, with the same seed.
+The campaigns named have nothing hidden. Of each a cause is drawn that leaves SIGMAS standard deviations: χ² of the best nominal
+fit to the same drops without noise, less that of nothing hidden, is its square. Where no size inside the cause's limits does,
+another is drawn. The plan's twin has it, with the same seed and with noise.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
+import tempfile
 import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from make_campaigns import make_campaign
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
 from labsim.effects import Effect
+from labsim.errors import LabsimError
 from labsim.inference.calibrate import prepare
 from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
 from labsim.records import Campaign
 
 SIGMAS = 8.0
+CLOSE = 0.15  # of ln of the standard deviations
+TRIES, STRIDE = 6, 3.0  # sizes tried, and how much larger the next may be
+ROOM = 2.0  # factor on both ends of the range of p_m, which must not stop the fit
 CAUSES = (
     "strength_rate", "shear_strength", "tensile_strength", "pore_gas", "side_friction", "sample_drift",
     "density_gradient", "projectile_mass", "strength_slope", "surface_crust",
@@ -63,8 +74,13 @@ def hide(name: str, effect: Effect, size: float, sign: float, rng: np.random.Gen
     return {"dust": {"crust": [value, length]}} if value > SOFTEST else None
 
 
+def hide_drawn(name: str, effect: Effect, sign: float, draws: int, size: float) -> dict | None:
+    """The same with what else is drawn the same at every size."""
+    return hide(name, effect, size, sign, np.random.default_rng(draws))
+
+
 def find_sizes(campaign: Campaign) -> dict[str, tuple[Effect, float]]:
-    """Of every cause: the effect and the amplitude that is SIGMAS standard deviations."""
+    """Of every cause: the effect and the amplitude that is SIGMAS standard deviations where it is small."""
     bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
     found = screen(bench, nominal, np.random.default_rng(1))
     signal = {score.name: score.signal for score in found.scores}
@@ -73,6 +89,43 @@ def find_sizes(campaign: Campaign) -> dict[str, tuple[Effect, float]]:
         for name in CAUSES
         if signal.get(name, 0.0) > 0.0 and math.isfinite(signal[name])
     }
+
+
+def leave(plan: dict, folder: Path) -> float:
+    """χ² that the best nominal fit leaves of a campaign without noise. Raises LabsimError, RuntimeError where there is none."""
+    with tempfile.TemporaryDirectory(dir=folder) as made:
+        name, _ = make_campaign(({**plan, "quiet": True}, Path(made)))
+        campaign = read_campaign(Path(made) / name)
+        low, high = campaign.p_m_range
+        campaign = replace(campaign, p_m_range=(low / ROOM, high * ROOM))
+        return prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))[1].chi_square
+
+
+def aim(
+    plan: dict, hide_size: Callable[[float], dict | None], size: float, folder: Path, floor: float
+) -> dict | None:
+    """What to hide so that SIGMAS are left, within CLOSE; None where no size does. size : the first; floor : χ² of nothing."""
+    tried = {0.0: 0.0}
+    for _ in range(TRIES):
+        hidden = hide_size(size)
+        if hidden is None:
+            return None
+        try:
+            left = math.sqrt(max(leave({**plan, **hidden}, folder) - floor, 0.0))
+        except (LabsimError, RuntimeError):
+            return None
+        print(f"# {hidden}: {left:.1f} sigma", file=sys.stderr, flush=True)
+        if abs(math.log(max(left, 0.1) / SIGMAS)) < CLOSE:
+            return hidden
+        tried[size] = left
+        below = max((s for s, sigma in tried.items() if sigma < SIGMAS), default=0.0)
+        above = min((s for s, sigma in tried.items() if sigma > SIGMAS), default=math.inf)
+        if math.isinf(above):
+            size *= min(SIGMAS / max(left, 0.5), STRIDE)
+        else:
+            share = (SIGMAS - tried[below]) / (tried[above] - tried[below])
+            size = below + min(max(share, 0.1), 0.9) * (above - below)
+    return None
 
 
 def write(value: object) -> str:
@@ -98,14 +151,18 @@ def main() -> None:
     waiting: list[str] = []
     for k, name in enumerate(asked.names.split(",")):
         sizes = find_sizes(read_campaign(asked.folder / name))
+        floor = leave(plan[name], asked.folder)
         if len(waiting) <= 2:  # every cause as often as the others, but where none of those left is possible
             waiting += list(map(str, rng.permutation(CAUSES)))
         for cause in list(waiting):
             sign = float(rng.choice([-1.0, 1.0]))
+            draws = rng.integers(2**32)
             hidden = None
             for each in (sign, -sign):
                 if hidden is None and cause in sizes:
-                    hidden = hide(cause, *sizes[cause], each, rng)
+                    effect, size = sizes[cause]
+                    hide_size = partial(hide_drawn, cause, effect, each, draws)
+                    hidden = aim(plan[name], hide_size, size, asked.folder, floor)
             if hidden is not None:
                 waiting.remove(cause)
                 break
@@ -114,7 +171,7 @@ def main() -> None:
         print(f'[[campaign]]\nname = "f{asked.first + k}"\ncause = "{cause}"')
         print(f'note = "{SIGMAS:g} sigma, as {name} without it"')
         print(f"pm = {plan[name]['pm']}\nseed = {plan[name]['seed']}")
-        print("".join(f"{key} = {write(value)}\n" for key, value in hidden.items()))
+        print("".join(f"{key} = {write(value)}\n" for key, value in hidden.items()), flush=True)
 
 
 if __name__ == "__main__":

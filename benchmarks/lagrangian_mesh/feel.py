@@ -23,6 +23,7 @@ class Sensing:
     rate: float  # Hz
     noise: float
     scale: float
+    quiet: bool = False  # no noise is drawn and the zero is right, stated as they would be
 
 
 def speed_at(result: Result, clock: np.ndarray) -> np.ndarray:
@@ -41,7 +42,8 @@ def feel(result: Result, sensing: Sensing, rng: np.random.Generator) -> tuple[np
     speed = speed_at(result, edges - contact)
     felt = 1.0 - np.diff(speed) * sensing.rate / GRAVITY
     sigma = sensing.noise * float(felt.max())
-    felt = sensing.scale * felt + OFFSET_SIGMA * rng.normal() + sigma * rng.normal(size=felt.size)
+    off = OFFSET_SIGMA * rng.normal() + sigma * rng.normal(size=felt.size)
+    felt = sensing.scale * felt + (0.0 if sensing.quiet else off)
     return edges[1:] - 0.5 / sensing.rate, felt, sigma
 
 
@@ -52,7 +54,7 @@ def write_felt(
     folder.mkdir(parents=True)
     lines = [f"{t:.7f},{a:.4f}" for t, a in zip(times, felt, strict=True)]
     (folder / "acceleration.csv").write_text("time_s,a_g\n" + "\n".join(lines) + "\n")
-    stated = speed * (1.0 + SPEED_SIGMA * rng.normal())
+    stated = speed * (1.0 + (0.0 if sensing.quiet else SPEED_SIGMA * rng.normal()))
     (folder / "drop.toml").write_text(
         f"""[projectile]
 tip = "hemisphere"

@@ -9,15 +9,17 @@ call makes what is missing. The plan says what is hidden in each (campaigns.toml
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
-from feel import SCALE_SIGMA, Sensing, write_felt
+from feel import GRAVITY, SCALE_SIGMA, Sensing, write_felt
 from mesh import BEAD_DENSITY, Dust, Numerics, run_drop
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
+from film import HEIGHT_SIGMA, Filming, film, write_drop
 
 BEAD = BEAD_DENSITY * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 CELLS = 16.0
@@ -30,6 +32,7 @@ SERIES = (
     (1.5e-3, 1.0, 0.42),
     (1.5e-3, 2.5, 0.22),
 )
+PIXELS = 0.03  # of a film, in tip radii
 RATES, NOISES = (2e3, 50e3), (0.001, 0.02)  # Hz; over the peak: drawn between, evenly in the logarithm
 
 
@@ -38,15 +41,19 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     name = hidden["name"]
     rng = np.random.default_rng(hidden["seed"])
     rate, noise = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in (RATES, NOISES))
-    sensing = Sensing(rate, noise, 1.0 + SCALE_SIGMA * rng.normal())
+    quiet = bool(hidden.get("quiet"))
+    scale = 1.0 + SCALE_SIGMA * rng.normal()
+    sensing = Sensing(rate, noise, 1.0 if quiet else scale, quiet)
     heavier_than_stated = hidden.get("measure", {}).get("mass", 1.0)
     sequence = rng.permutation(len(SERIES)) + 1
+    films = np.random.default_rng([hidden["seed"], 1])  # what is felt is the same with a film and without
     drops = {}
     with labelled.write_folder(out, name) as folder:
         for k, (radius, heavier, nominal) in enumerate(SERIES):
             mass = BEAD * radius**3 * heavier
             speed = nominal * rng.uniform(0.94, 1.06)
-            own = labelled.draw_strength(hidden, rng.normal(), (int(sequence[k]) - 1) / (len(SERIES) - 1))
+            normal = 0.0 * rng.normal() if quiet else rng.normal()
+            own = labelled.draw_strength(hidden, normal, (int(sequence[k]) - 1) / (len(SERIES) - 1))
             result = run_drop(
                 Dust(p_m=own, **labelled.set_dust(hidden)),
                 radius,
@@ -60,6 +67,19 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 folder / "drops" / label, result, sensing, rng,
                 radius=radius, mass=mass, sequence=int(sequence[k]), speed=speed,
             )  # fmt: skip
+            if hidden.get("film") == "alone":
+                shutil.rmtree(folder / "drops" / label)
+            if hidden.get("film"):
+                filming = Filming(
+                    frame_rate=10e3, pixel_size=PIXELS * radius, after=1.5 * result.stopping_time
+                )
+                frames, rows, surface = film(result, speed, filming, films)
+                height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * films.normal()
+                write_drop(
+                    folder / "drops" / f"{label}-film", frames, rows, surface,
+                    radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5), length=9e-3,
+                    filming=filming, same_as="" if hidden["film"] == "alone" else label,
+                )  # fmt: skip
             drops[label] = {
                 "true_v0": speed,
                 "true_depth": result.stopping_depth,

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 from drop import GRAVITY, SOLID, Body, Dust, Numerics, extrapolate_drop, run_drop
-from film import HEIGHT_SIGMA, Filming, film, write_drop
 from scan import write_scan
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
+from film import HEIGHT_SIGMA, Filming, film, write_drop
 from labelled import SMALL
 
 BEAD = 2540.0 * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
@@ -100,7 +100,8 @@ def drop_rods(hidden: dict, folder: Path, rng: np.random.Generator) -> dict:
         height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * rng.normal()
         write_drop(
             folder / "drops" / label, frames, rows, surface,
-            radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5), filming=filming,
+            radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5),
+            length=4e-3 if radius < 1e-3 else 9e-3, filming=filming,
         )  # fmt: skip
     return drops
 

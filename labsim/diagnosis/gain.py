@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from ..inference.fitting import Fit
 from ..inference.workbench import Workbench
@@ -78,12 +78,12 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
         precision += columns.T @ solved
         pull += solved.T @ block.residual
     drops = []
-    for model in bench.tracks.models:
-        section = linear.sections[model.observed.name]
-        below = np.zeros(section.stop - section.start, dtype=bool)
-        below[: model.data.size] = model.held
+    models = {model.observed.name: model for model in bench.tracks.models}
+    for records in bench.tracks.samples.values():
         held = np.zeros(linear.residual.size, dtype=bool)
-        held[section] = below
+        for name in records:
+            section = linear.sections[name]
+            held[section.start : section.start + models[name].data.size] = models[name].held
         seen = ~held
         factor = cho_factor(linear.covariance[np.ix_(seen, seen)], lower=True)
         cross = linear.covariance[np.ix_(held, seen)]
@@ -92,7 +92,7 @@ def _hold_out(bench: Workbench, fit: Fit, known: bool) -> tuple[list[_HeldDrop],
         weights = cho_solve(factor, cross.T).T
         reach = design[held] - cross @ solved
         spread = linear.covariance[np.ix_(held, held)] - weights @ cross.T + reach @ covariance @ reach.T
-        lengths = model.lengths[np.ix_(model.held, model.held)]
+        lengths = block_diag(*(models[n].lengths[np.ix_(models[n].held, models[n].held)] for n in records))
         drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread, lengths))
     return drops, pull, precision
 
@@ -102,7 +102,7 @@ def predict_held_out(bench: Workbench, fit: Fit, *, known: bool = False) -> Held
 
     A single drop leaves nothing to predict it from: its figures are NaN. known : the globals are held where the fit has them.
     """
-    names = tuple(model.observed.name for model in bench.tracks.models)
+    names = tuple(bench.tracks.samples)
     if len(names) < 2:
         nothing = np.full(1, math.nan)
         return HeldOut(names, nothing, nothing, nothing, np.ones(1))
@@ -127,7 +127,7 @@ def check_prediction(bench: Workbench, fit: Fit, random: np.random.Generator, dr
     A fault that is smooth along the way is a few directions among hundreds of data, where χ² does not show it; what one drop
     says of another is few numbers. Its null law is drawn: data of the fitted model's own covariance. 1 with a single drop.
     """
-    if len(bench.tracks.models) < 2:
+    if len(bench.tracks.samples) < 2:
         return 1.0
     drops, pull, precision = _hold_out(bench, fit, known=False)
     lower = np.tril(fit.drops.lower)

@@ -15,7 +15,7 @@ BINS = 40  # to the stop; a run's own table has as many
 # of the stop, compared: at it the force breaks off, and no straight line in ln p_m follows a break that moves
 COMPARED = 0.85
 BEFORE_FLIGHT = 2.0  # stretches that free flight ends before contact
-FEWEST = 8  # stretches in the dust
+FEWEST = 4  # stretches in the dust
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,9 @@ def observe_impact(drop: Drop) -> ObservedImpact:
     record = read_acceleration(drop.record.path, drop.accelerometer)
     impact = find_impact(record, drop)
     stop = impact.stopping_time if math.isfinite(impact.stopping_time) else float(impact.time[-1])
-    last = impact.contact_time + COMPARED * stop
     width = max(stop / BINS, record.step)
+    # the stop is known to a sample, and one is a mean over its interval
+    last = impact.contact_time + min(COMPARED * stop, stop - 1.5 * record.step)
     start = impact.contact_time - BEFORE_FLIGHT * width
     free = record.time < start
     if math.isfinite(impact.released):

@@ -130,8 +130,9 @@ def _ask(process: SpawnProcess, pipe: Connection, call: tuple) -> Any:
 
 def _say_end(exitcode: int | None) -> str:
     if exitcode is not None and exitcode < 0:
-        return f"killed by {signal.Signals(-exitcode).name}"
-    return f"exit status {exitcode}"
+        return f"killed by {signal.Signals(-exitcode).name}; out of memory?"
+    # a worker starts by importing the script that asked for it
+    return f'exit status {exitcode}; does the script that calls labsim do so under if __name__ == "__main__"?'
 
 
 @contextmanager

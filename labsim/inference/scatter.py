@@ -68,9 +68,9 @@ def estimate_scatter(bench: Workbench, fit: Fit) -> ScatterEstimate:
     value = []
     for scatter in LADDER:
         covariance = drops.covariance.copy()
-        for section in drops.sections.values():
-            column = tangent[section]
-            covariance[section, section] += (scatter**2 - used**2) * np.outer(column, column)
+        for records in bench.tracks.samples.values():
+            rows = np.concatenate([np.arange(len(tangent))[drops.sections[name]] for name in records])
+            covariance[np.ix_(rows, rows)] += (scatter**2 - used**2) * np.outer(tangent[rows], tangent[rows])
         lower = np.linalg.cholesky(covariance)
         white = solve_triangular(lower, np.stack([drops.residual, tangent], axis=1), lower=True)
         information = white[:, 1] @ white[:, 1]

@@ -126,7 +126,7 @@ def explain_loss(executor: Executor, trouble: BaseException, where: object) -> I
     return InferenceError(
         where,
         "--workers",
-        f"a worker died ({said}; out of memory?); start again, with fewer workers if it is memory: what is finished is kept",
+        f"a worker died ({said}); start again, with fewer workers if it is memory: what is finished is kept",
     )
 
 

@@ -38,6 +38,7 @@ USUAL_DEPTH, ROUGHER = 0.8, 1.0
 FORCE_AT_CONTACT, FORCE_LATE = 0.005, 0.02
 SHORT = 0.05  # of a stretch, over which a slope is taken
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
+KNOWN = 1.5  # stretches, at least, in which contact lies
 
 
 @dataclass(frozen=True)
@@ -204,12 +205,11 @@ class AccelerationModel:
         """Nuisances after the best step (contact time, ln speed), and how far that was: in stretches, in per cent."""
         free, speed_width = widths
         seen = self.observed.contact_time
-        reach = SHOWS_CONTACT * (
-            float(self.observed.end[-1]) - seen
-        )  # the record shows it: a far model must not run off
+        stretch = float(np.median(self.observed.end - self.observed.begin))
+        # the record shows it: a far model must not run off
+        reach = max(SHOWS_CONTACT * (float(self.observed.end[-1]) - seen), KNOWN * stretch)
         contact = float(np.clip(before.contact_time + best[0] * free, seen - reach, seen + reach))
         after = Instant(contact, before.log_speed + best[1] * speed_width, 0.0)
-        stretch = float(np.median(self.observed.end - self.observed.begin))
         return after, max(abs(contact - before.contact_time) / stretch, abs(best[1] * speed_width) * 100)
 
 

@@ -105,8 +105,11 @@ def linearise_drop(
     nominal: Probe,
     terms: Terms,
     probes: Mapping[str, Probe],
+    *,
+    with_others: bool = False,
 ) -> DropTerms:
-    """Residual, errors and tangents of one drop; instant : its nuisances; nominal : the point itself (its step means nothing)."""
+    """Residual, errors and tangents of one drop; instant : its nuisances; nominal : the point itself (its step means nothing);
+    with_others : other records are of the same drop, and have the strength of its dust in common with it."""
     observed = model.observed
     name, n = observed.name, model.data.size
     instrument = nominal.instruments[name]
@@ -134,12 +137,10 @@ def linearise_drop(
     mass = observed.drop.projectile
     scatter = math.hypot(terms.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
     zeros = model.zeros
-    columns = [
-        by_contact * FREE,
-        by_speed * SPEED_WIDTH,
-        zeros[:, 0],
-        by_strength * max(scatter, LEAST_SCATTER),
-    ]
+    own_strength = by_strength * max(scatter, LEAST_SCATTER)
+    columns = [by_contact * FREE, by_speed * SPEED_WIDTH, zeros[:, 0]]
+    if not with_others:
+        columns.append(own_strength)
     final, stop = np.exp(code[0]), np.exp(code[1])
     local = np.column_stack([*columns, zeros[:, 1:], model.solver_noise])
     pull = np.zeros(local.shape[1])
@@ -161,6 +162,8 @@ def linearise_drop(
         * terms.numerical_slope,
         "numerical strength": by_strength * terms.numerical_strength,
     }
+    if with_others:
+        shared[f"strength of {observed.drop.sample}"] = own_strength
 
     off, length, changes = model.find_solver_error(here, clock, final, instrument, terms.numerical)
     plain = here if code is response.plain else model.predict(response.plain, instrument, instant)

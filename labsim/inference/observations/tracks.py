@@ -57,6 +57,14 @@ class Tracks:
         """Nuisances by name, one record a drop."""
         return [Instant(*map(float, row)) for row in nuisances]
 
+    @property
+    def samples(self) -> dict[str, list[str]]:
+        """Names of the records of each drop: one, or one an instrument."""
+        found: dict[str, list[str]] = {}
+        for model in self.models:
+            found.setdefault(model.observed.drop.sample, []).append(model.observed.name)
+        return found
+
     def linearise(
         self,
         nuisances: FloatArray,
@@ -65,8 +73,17 @@ class Tracks:
         terms: Terms,
         probes: Mapping[str, Probe],
     ) -> DropsBlock:
+        samples = self.samples
         parts = [
-            linearise_drop(model, instant, log_p_m, nominal, terms, probes)
+            linearise_drop(
+                model,
+                instant,
+                log_p_m,
+                nominal,
+                terms,
+                probes,
+                with_others=len(samples[model.observed.drop.sample]) > 1,
+            )
             for model, instant in zip(self.models, self.instants(nuisances), strict=True)
         ]
         places = lay_out(part.residual.size for part in parts)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
-from drop import GRAVITY, Result
 
+GRAVITY = 9.81  # m/s^2
 ROW_SIGMA = 0.08  # px
 SURFACE_SIGMA = 0.15  # px
 HEIGHT_SIGMA = 0.15e-3  # m
@@ -26,6 +27,15 @@ class Filming:
     frame_factor: float = 1.0
     surface_error: float = 0.0  # px added to the stated row
     wobble: tuple[float, float] = (0.0, 1.0)  # px, Hz
+
+
+class Result(Protocol):
+    """A drop of either solver: its curve, (k,) in SI."""
+
+    time: np.ndarray
+    depth: np.ndarray
+    speed: np.ndarray
+    stopping_depth: float
 
 
 def depth_at(result: Result, time: np.ndarray) -> np.ndarray:
@@ -64,8 +74,20 @@ def film(result: Result, speed: float, filming: Filming, rng: np.random.Generato
 
 
 def write_drop(
-    folder: Path, frames, rows, surface, *, radius, mass, sequence, height, filming: Filming
+    folder: Path,
+    frames,
+    rows,
+    surface,
+    *,
+    radius,
+    mass,
+    sequence,
+    height,
+    length,
+    filming: Filming,
+    same_as: str = "",
 ) -> None:
+    """same_as : the drop of which this film is another record."""
     folder.mkdir(parents=True)
     lines = [f"{frame},{row:.3f}" for frame, row in zip(frames, rows, strict=True)]
     (folder / "track.csv").write_text("frame,tip_row_px\n" + "\n".join(lines) + "\n")
@@ -73,12 +95,12 @@ def write_drop(
         f"""[projectile]
 tip = "hemisphere"
 tip_radius_mm = {radius * 1e3:.3f}
-length_mm = {4.0 if radius < 1e-3 else 9.0:.2f}
+length_mm = {length * 1e3:.2f}
 mass_mg = {mass * 1e6:.4f}
 mass_sigma_mg = {mass * 5e3:.4f}
 
 [drop]
-sequence = {sequence}
+{f'same_as = "{same_as}"' if same_as else f"sequence = {sequence}"}
 height_mm = {height * 1e3:.2f}
 height_sigma_mm = {HEIGHT_SIGMA * 1e3:.2f}
 
