@@ -227,6 +227,62 @@ def test_two_drops_cannot_share_a_place_in_the_sequence(campaign: Path) -> None:
         read_campaign(campaign)
 
 
+def add_record(campaign: Path, change: tuple[str, str] = ("", "")) -> None:
+    """The drop D01 once more, by an accelerometer."""
+    shutil.copytree(campaign / "drops/D01", campaign / "drops/D01-felt")
+    file = campaign / "drops/D01-felt/drop.toml"
+    text = file.read_text()
+    projectile = text[text.index("[projectile]") : text.index("[drop]")]
+    felt = [1.0] * 100 + [0.0] * 305 + [16.0] * 20 + [1.0] * 100  # at rest, falling, in the dust, at rest
+    rows = "\n".join(f"{k * 1e-4:.4f},{g}" for k, g in enumerate(felt))
+    (file.parent / "a.csv").write_text(f"time_s,a_g\n{rows}\n")
+    said = f"""{projectile}[drop]
+same_as = "D01"
+impact_speed_m_s = 0.3
+impact_speed_sigma_m_s = 0.01
+[record]
+kind = "acceleration"
+file = "a.csv"
+time_column = "time_s"
+acceleration_column = "a_g"
+unit = "g"
+reads_at_rest = 1.0
+sigma = 0.1
+offset_sigma = 0.05
+scale_sigma = 0.01
+"""
+    file.write_text(said.replace(*change) if change[0] else said)
+
+
+def test_another_record_of_a_drop_is_that_drop(campaign: Path) -> None:
+    add_record(campaign)
+    first, felt = read_campaign(campaign).drops[:2]
+    assert (felt.name, felt.sample, felt.sequence) == ("D01-felt", "D01", first.sequence)
+    assert describe_campaign(read_campaign(campaign))["drops"] == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('same_as = "D01"', 'same_as = "D09"'), r"drop\.same_as.*D09.*no other drop"),
+        (('same_as = "D01"', 'same_as = "D01-felt"'), r"drop\.same_as.*no other drop"),
+        (("mass_mg = 1", "mass_mg = 2"), r"\[projectile\].*not that of D01"),
+    ],
+)
+def test_a_record_of_another_drop_is_refused(change: tuple[str, str], words: str, campaign: Path) -> None:
+    add_record(campaign, change)
+    with pytest.raises(CampaignError, match=words):
+        read_campaign(campaign)
+
+
+def test_a_drop_filmed_twice_is_two_drops(campaign: Path) -> None:
+    shutil.copytree(campaign / "drops/D01", campaign / "drops/D02")
+    file = campaign / "drops/D02/drop.toml"
+    file.write_text(file.read_text().replace("sequence = 3", 'same_as = "D01"'))
+    with pytest.raises(CampaignError, match=r'record\.kind.*is "track" as in D01'):
+        read_campaign(campaign)
+
+
 def test_reading_changes_nothing(campaign: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in campaign.rglob("*")}
     read_campaign(campaign)

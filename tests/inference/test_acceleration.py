@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -15,11 +16,13 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
+from labsim.diagnosis.gain import predict_held_out
 from labsim.effects import Instrument
 from labsim.inference import steps
 from labsim.inference.calibrate import calibrate, prepare
 from labsim.inference.curves import FRACTIONS, decode_speed, encode_speeds, smooth_change
 from labsim.inference.observations.acceleration_model import AccelerationModel
+from labsim.inference.scatter import estimate_scatter, set_terms
 from labsim.inference.tangents import linearise_at
 from labsim.records import STANDARD_GRAVITY, Material, Projectile
 from labsim.report.outputs import write_result
@@ -59,6 +62,50 @@ def test_an_accelerometer_stands_beside_cameras(tmp_path: Path) -> None:
     assert kinds == [True, False] * 3
     assert low < 1300.0 < high and sound.p_value > 0.05
     assert spoilt.fit.chi_square > sound.fit.chi_square + 7.0**2
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_five_samples_in_the_dust_are_enough(seed: int, tmp_path: Path) -> None:
+    """A slow sensor: contact lies anywhere in a sample, the stop is known to one, and no drop is left out."""
+    drops = [(1.0, 12.0, 0.35), (1.0, 12.0, 0.7), (1.0, 12.0, 0.5)]
+    folder = accelerations.write_campaign(tmp_path / "c", rate=2.2e3, noise=0.002, seed=seed, drops=drops)
+    found, (low, high) = fit(folder, tmp_path)
+    models = found.bench.tracks.models
+    assert len(models) == len(drops) and max(np.sum(m.below) for m in models) < 8
+    assert low < 1300.0 < high and found.p_value > 0.05
+
+
+def write_both(folder: Path, *, joined: bool) -> Path:
+    """Six drops that a camera and an accelerometer record; ``joined``: the campaign says so, else they are twelve drops."""
+    seen = laws.write_campaign(folder)
+    text = seen / "campaign.toml"
+    text.write_text(text.read_text().replace("[sample]", "[sample]\nscatter = 0.3"))
+    felt = accelerations.write_campaign(folder.with_name(f"{folder.name}-felt"))
+    for number in range(1, 7):
+        at = seen / "drops" / f"A{number:02d}"
+        shutil.copytree(felt / "drops" / f"D{number:02d}", at)
+        said = (at / "drop.toml").read_text()
+        camera = (seen / "drops" / f"D{number:02d}" / "drop.toml").read_text()
+        projectile = camera[camera.index("[projectile]") : camera.index("[drop]")]
+        place = f'same_as = "D{number:02d}"' if joined else f"sequence = {number + 6}"
+        said = projectile + said[said.index("[drop]") :].replace(f"sequence = {number}", place)
+        (at / "drop.toml").write_text(said)
+    return seen
+
+
+def test_two_records_of_a_drop_have_its_dust_in_common(tmp_path: Path) -> None:
+    """Where samples differ by 30 %, twelve drops say more of p_m than six that two instruments record."""
+    widths = []
+    for joined in (True, False):
+        campaign = read_campaign(write_both(tmp_path / f"{joined}", joined=joined))
+        terms = set_terms(campaign)
+        bench, found = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1, terms=terms)
+        widths.append(math.sqrt(found.covariance[0, 0]))
+        held = predict_held_out(bench, found)
+        assert len(held.names) == (6 if joined else 12)
+        assert estimate_scatter(bench, found).sd > 0.0
+    # as 1 over the root of the number of drops, beside what is common to all
+    assert widths[0] > 1.3 * widths[1]
 
 
 def test_errors_of_an_acceleration_integrate_to_depths(tmp_path: Path) -> None:

@@ -67,6 +67,7 @@ def write_campaign(
     noise: float = 0.01,
     scale: float = 1.0,
     seed: int = 3,
+    rate: float = 20e3,
     drops: list[tuple[float, float, float]] = DROPS,
 ) -> Path:
     """noise : of a sample, of the largest reading; scale : of the sensor, over what is stated."""
@@ -76,7 +77,7 @@ def write_campaign(
     for number, (radius, mass, speed) in enumerate(drops, start=1):
         at = folder / "drops" / f"D{number:02d}"
         at.mkdir(parents=True)
-        time, felt, _ = make_pulse(radius, mass, speed, p_m)
+        time, felt, _ = make_pulse(radius, mass, speed, p_m, rate)
         sigma = noise * felt.max()
         seen = scale * felt + 0.05 * rng.standard_normal() + sigma * rng.standard_normal(felt.size)
         write_record(at, time, seen)
