@@ -17,6 +17,8 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
+
 SMALL = 0.5e-3  # m, the radius that forces on the side of a rod are stated for
 SCATTER = 0.02  # of p_m from sample to sample, where the plan says no other
 # the words of the labelled campaigns' truth.json
@@ -100,6 +102,22 @@ bulk_modulus_Pa = {nominal.bulk_modulus:.1f}   # K(phi) = bulk_modulus * (phi/0.
 bulk_exponent = 4.0
 shear_to_bulk = {nominal.shear_to_bulk}         # mu = shear_to_bulk * K
 contact_friction = 0.0
+""")
+
+
+def write_test(folder: Path, kind: str, filling, stress, sigma: float, rng: np.random.Generator) -> None:
+    """A static test beside the drops. filling, stress (Pa) : rows of the true curve; sigma : relative error of each row."""
+    folder.mkdir(parents=True)
+    rows = stress * np.exp(sigma * rng.normal(size=len(stress)))
+    lines = [f"{phi:.4f},{each:.2f}" for phi, each in zip(filling, rows, strict=True)]
+    (folder / "curve.csv").write_text("phi,pressure\n" + "\n".join(lines) + "\n")
+    (folder / "strength.toml").write_text(f"""[test]
+kind = "{kind}"
+file = "curve.csv"
+filling_factor_column = "phi"
+pressure_column = "pressure"
+pressure_unit = "Pa"
+relative_sigma = {sigma:g}
 """)
 
 

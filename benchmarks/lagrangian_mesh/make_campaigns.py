@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from feel import GRAVITY, SCALE_SIGMA, Sensing, write_felt
 from mesh import BEAD_DENSITY, Dust, Numerics, run_drop
+from quadrilateral import find_strengths
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
@@ -46,7 +47,8 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
     sensing = Sensing(rate, noise, 1.0 if quiet else scale, quiet)
     heavier_than_stated = hidden.get("measure", {}).get("mass", 1.0)
     sequence = rng.permutation(len(SERIES)) + 1
-    films = np.random.default_rng([hidden["seed"], 1])  # what is felt is the same with a film and without
+    # what is felt is the same with films and tests beside it and without
+    beside = np.random.default_rng([hidden["seed"], 1])
     drops = {}
     with labelled.write_folder(out, name) as folder:
         for k, (radius, heavier, nominal) in enumerate(SERIES):
@@ -73,8 +75,8 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 filming = Filming(
                     frame_rate=10e3, pixel_size=PIXELS * radius, after=1.5 * result.stopping_time
                 )
-                frames, rows, surface = film(result, speed, filming, films)
-                height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * films.normal()
+                frames, rows, surface = film(result, speed, filming, beside)
+                height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * beside.normal()
                 write_drop(
                     folder / "drops" / f"{label}-film", frames, rows, surface,
                     radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5), length=9e-3,
@@ -86,6 +88,11 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 "true_stopping_time": result.stopping_time,
                 "p_m": own,
             }
+        truth = Dust(p_m=hidden["pm"], **labelled.set_dust(hidden))
+        for kind, sigma in hidden.get("tests", {}).items():
+            rows = np.linspace(0.16, 0.40, 6)
+            stress = [find_strengths(phi, truth.law)[kind == "tension"] for phi in rows]
+            labelled.write_test(folder / "strength" / kind, kind, rows, np.array(stress), sigma, beside)
         nominal_dust = Dust()
         labelled.write_sample(
             folder,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..records import Campaign, StrengthTest
 from .found import ODD, Found
 
 LEAST_ROWS = 6  # below, a curve through the rows says nothing of their scatter
-OFTEN = 2.0  # scatter over stated error from which that is too small
+CHANCE = 1e-3  # of a scatter as large, below which the stated error is too small
 
 
 def inspect_strength_test(test: StrengthTest, campaign: Campaign) -> Found:
@@ -33,8 +34,9 @@ def inspect_strength_test(test: StrengthTest, campaign: Campaign) -> Found:
     elif phi.size >= LEAST_ROWS and np.ptp(phi) > 1e-3:
         curve = np.polynomial.Polynomial.fit(phi, np.log(stress), min(4, phi.size - 3))
         left = np.log(stress) - curve(phi)
-        scatter = math.sqrt(left @ left / (phi.size - curve.degree() - 1))
-        if scatter > OFTEN * test.relative_sigma:
+        free = phi.size - curve.degree() - 1
+        scatter = math.sqrt(left @ left / free)
+        if chi2.sf(left @ left / test.relative_sigma**2, free) < CHANCE:
             found.odd.append(
                 f"rows scatter by {100 * scatter:.2g} % about a smooth curve, relative_sigma says "
                 f"{100 * test.relative_sigma:.2g} %"

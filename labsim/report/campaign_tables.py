@@ -91,7 +91,7 @@ def say_records(bench: Workbench) -> str:
 
 def say_count(bench: Workbench) -> str:
     """``1 drop``, ``25 pushes``."""
-    count, records = len(bench.tracks.models), say_records(bench)
+    count, records = len(bench.tracks.samples), say_records(bench)
     return f"{count} {records if count != 1 else 'push' if records == 'pushes' else 'drop'}"
 
 

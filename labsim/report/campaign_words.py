@@ -26,7 +26,8 @@ def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[D
     sample = campaign.sample
     tests = f", {say_count(len(campaign.strength_tests), 'static test')}" if campaign.strength_tests else ""
     words = (
-        f"{say_count(len(views), 'drop')} with {_say_records(bench.drops)}, {say_count(len(campaign.scans), 'CT scan')}{tests}, "
+        f"{say_count(len(bench.tracks.samples), 'drop')} with {_say_records(bench.drops)}, "
+        f"{say_count(len(campaign.scans), 'CT scan')}{tests}, "
         f"into dust of filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, "
         f"{sample.diameter * 1e3:g} mm wide and {sample.depth * 1e3:g} mm deep, in gas of {sample.gas_pressure:g} Pa. "
         f"The nominal simulation is {campaign.geometry}, with gravity of {campaign.gravity:g} m/s²."
