@@ -3,9 +3,9 @@
     python benchmarks/lagrangian_mesh/make_campaigns.py FOLDER --plan fresh.toml --only f51,f52
     python benchmarks/lagrangian_mesh/draw_causes.py FOLDER f51,f52 --first 71 --seed 20261125 > more.toml
 
-The campaigns named have nothing hidden. Of each a cause is drawn that leaves SIGMAS standard deviations: χ² of the best nominal
-fit to the same drops without noise, less that of nothing hidden, is its square. Where no size inside the cause's limits does,
-another is drawn. The plan's twin has it, with the same seed and with noise.
+The campaigns named have nothing hidden. Of each a cause is drawn that is SIGMAS standard deviations strong: to the same drops
+without noise, its square is how much lower χ² of the best fit is with the cause than without. Where no size inside the cause's
+limits does, another is drawn. The plan's twin has it, with the same seed and with noise.
 """
 
 from __future__ import annotations
@@ -15,9 +15,7 @@ import math
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +26,7 @@ from labsim.diagnosis.screen import screen
 from labsim.effects import Effect
 from labsim.errors import LabsimError
 from labsim.inference.calibrate import prepare
+from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
 from labsim.records import Campaign
@@ -44,39 +43,36 @@ WEAKEST = 0.2  # of K0, Δ, factors: what the mesh still follows
 SOFTEST = -0.027  # of φ in a crust: dust has no strength at φ1
 
 
-def hide(name: str, effect: Effect, size: float, sign: float, rng: np.random.Generator) -> dict | None:
-    """Keys of a campaign in a plan, or None where a cause of this size is none."""
+def hide(name: str, effect: Effect, size: float, rng: np.random.Generator) -> tuple[dict, float] | None:
+    """Keys of a campaign in a plan, and the effect's amplitude; None where a cause of this size (its sign counts) is none."""
     parameter = effect.amplitudes[0]
     if name == "strength_rate":
         n = float(np.clip(rng.normal(0.5, 0.15), 0.1, 1.0))
-        eta = size * 1000.0 ** (0.5 - n)
-        return {"dust": {"eta": eta, "rate_n": n}} if eta <= 1.0 else None
+        eta = abs(size) * 1000.0 ** (0.5 - n)
+        return ({"dust": {"eta": eta, "rate_n": n}}, eta) if eta <= 1.0 else None
     if name in ("shear_strength", "tensile_strength", "projectile_mass"):
-        factor = (1.0 + size) ** sign
+        factor = (1.0 + abs(size)) ** math.copysign(1.0, size)
+        if not max(WEAKEST, parameter.limits[0]) <= factor <= parameter.limits[1]:
+            return None
         key = {"shear_strength": "shear_factor", "tensile_strength": "tensile_factor"}.get(name)
-        within = max(WEAKEST, parameter.limits[0]) <= factor <= parameter.limits[1]
-        return ({"dust": {key: factor}} if key else {"measure": {"mass": factor}}) if within else None
-    value = parameter.null + sign * size
+        return ({"dust": {key: factor}} if key else {"measure": {"mass": factor}}), factor - 1.0
+    value = parameter.null + size
     if not parameter.limits[0] <= value <= parameter.limits[1]:
         return None
+    keys: dict | None = None
     if name == "pore_gas":
-        return {"dust": {"gas_pressure": value}}
-    if name == "side_friction":
-        return {"body": {"side": value}}
-    if name == "sample_drift":
-        return {"drift": value} if abs(value) < 1.0 else None
-    if name == "density_gradient":
-        return {"dust": {"gradient": value}}
-    if name == "strength_slope":
-        return {"dust": {"delta": value}} if value > WEAKEST else None
-    assert name == "surface_crust"
-    length = next(each.null for each in effect.parameters if each.shape)
-    return {"dust": {"crust": [value, length]}} if value > SOFTEST else None
-
-
-def hide_drawn(name: str, effect: Effect, sign: float, draws: int, size: float) -> dict | None:
-    """The same with what else is drawn the same at every size."""
-    return hide(name, effect, size, sign, np.random.default_rng(draws))
+        keys = {"dust": {"gas_pressure": value}}
+    elif name == "side_friction":
+        keys = {"body": {"side": value}}
+    elif name == "sample_drift" and abs(value) < 1.0:
+        keys = {"drift": value}
+    elif name == "density_gradient":
+        keys = {"dust": {"gradient": value}}
+    elif name == "strength_slope" and value > WEAKEST:
+        keys = {"dust": {"delta": value}}
+    elif name == "surface_crust" and value > SOFTEST:
+        keys = {"dust": {"crust": [value, next(each.null for each in effect.parameters if each.shape)]}}
+    return None if keys is None else (keys, size)
 
 
 def find_sizes(campaign: Campaign) -> dict[str, tuple[Effect, float]]:
@@ -91,37 +87,40 @@ def find_sizes(campaign: Campaign) -> dict[str, tuple[Effect, float]]:
     }
 
 
-def leave(plan: dict, folder: Path) -> float:
-    """χ² that the best nominal fit leaves of a campaign without noise. Raises LabsimError, RuntimeError where there is none."""
+def find_strength(plan: dict, name: str, amplitude: float, folder: Path) -> float:
+    """Standard deviations: the root of what a cause takes from χ² of the best fit to a campaign without noise. What it does not
+    take is what two codes differ by in other dust. Raises LabsimError, RuntimeError where a run fails."""
     with tempfile.TemporaryDirectory(dir=folder) as made:
-        name, _ = make_campaign(({**plan, "quiet": True}, Path(made)))
-        campaign = read_campaign(Path(made) / name)
+        label, _ = make_campaign(({**plan, "quiet": True}, Path(made)))
+        campaign = read_campaign(Path(made) / label)
         low, high = campaign.p_m_range
         campaign = replace(campaign, p_m_range=(low / ROOM, high * ROOM))
-        return prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))[1].chi_square
+        bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+        found = fit_hypothesis(bench, (name,), (nominal.log_p_m, {name: amplitude}))
+        return math.sqrt(max(nominal.chi_square - found.chi_square, 0.0))
 
 
-def aim(
-    plan: dict, hide_size: Callable[[float], dict | None], size: float, folder: Path, floor: float
-) -> dict | None:
-    """What to hide so that SIGMAS are left, within CLOSE; None where no size does. size : the first; floor : χ² of nothing."""
+def aim(plan: dict, name: str, effect: Effect, size: float, drawn: int, folder: Path) -> dict | None:
+    """What to hide so that it is SIGMAS strong, within CLOSE; None where no size does. size : the first, with its sign; drawn :
+    seed of what else is drawn, the same at every size."""
     tried = {0.0: 0.0}
     for _ in range(TRIES):
-        hidden = hide_size(size)
+        hidden = hide(name, effect, size, np.random.default_rng(drawn))
         if hidden is None:
             return None
+        keys, amplitude = hidden
         try:
-            left = math.sqrt(max(leave({**plan, **hidden}, folder) - floor, 0.0))
+            strength = find_strength({**plan, **keys}, name, amplitude, folder)
         except (LabsimError, RuntimeError):
             return None
-        print(f"# {hidden}: {left:.1f} sigma", file=sys.stderr, flush=True)
-        if abs(math.log(max(left, 0.1) / SIGMAS)) < CLOSE:
-            return hidden
-        tried[size] = left
-        below = max((s for s, sigma in tried.items() if sigma < SIGMAS), default=0.0)
-        above = min((s for s, sigma in tried.items() if sigma > SIGMAS), default=math.inf)
-        if math.isinf(above):
-            size *= min(SIGMAS / max(left, 0.5), STRIDE)
+        print(f"# {keys}: {strength:.1f} sigma", file=sys.stderr, flush=True)
+        if abs(math.log(max(strength, 0.1) / SIGMAS)) < CLOSE:
+            return keys
+        tried[size] = strength
+        below = max((s for s, sigma in tried.items() if sigma < SIGMAS), key=abs)
+        above = min((s for s, sigma in tried.items() if sigma > SIGMAS), key=abs, default=None)
+        if above is None:
+            size *= min(SIGMAS / max(strength, 0.5), STRIDE)
         else:
             share = (SIGMAS - tried[below]) / (tried[above] - tried[below])
             size = below + min(max(share, 0.1), 0.9) * (above - below)
@@ -151,18 +150,16 @@ def main() -> None:
     waiting: list[str] = []
     for k, name in enumerate(asked.names.split(",")):
         sizes = find_sizes(read_campaign(asked.folder / name))
-        floor = leave(plan[name], asked.folder)
         if len(waiting) <= 2:  # every cause as often as the others, but where none of those left is possible
             waiting += list(map(str, rng.permutation(CAUSES)))
         for cause in list(waiting):
             sign = float(rng.choice([-1.0, 1.0]))
-            draws = rng.integers(2**32)
+            drawn = int(rng.integers(2**32))
             hidden = None
             for each in (sign, -sign):
                 if hidden is None and cause in sizes:
                     effect, size = sizes[cause]
-                    hide_size = partial(hide_drawn, cause, effect, each, draws)
-                    hidden = aim(plan[name], hide_size, size, asked.folder, floor)
+                    hidden = aim(plan[name], cause, effect, each * size, drawn, asked.folder)
             if hidden is not None:
                 waiting.remove(cause)
                 break
