@@ -43,7 +43,7 @@ def make_fit(seed: int, *, hidden: float = 0.0):
     fit = SimpleNamespace(drops=drops, blocks=(drops,), hypothesis=(EFFECT,), values={EFFECT: 0.0})
     bench = SimpleNamespace(
         effects={EFFECT: SimpleNamespace(amplitudes=[SimpleNamespace(scale=SCALE)])},
-        tracks=SimpleNamespace(models=models),
+        tracks=SimpleNamespace(models=models, samples={name: [name] for name in NAMES}),
     )
     return bench, fit
 
@@ -73,6 +73,19 @@ def test_a_held_out_drop_is_predicted_as_a_normal_distribution_says(known):
         # in units in which a covariance is not taken for singular
         score = multivariate_normal.logpdf(data * 1e6, mean * 1e6, spread * 1e12) + data.size * math.log(1e6)
         assert found.log_score[k] == pytest.approx(score, abs=1e-2)
+
+
+def test_two_records_of_a_drop_are_held_out_together():
+    bench, fit = make_fit(3)
+    bench.tracks.samples = {NAMES[0]: NAMES[:2], NAMES[2]: NAMES[2:]}
+    found = predict_held_out(bench, fit)
+    assert found.names == (NAMES[0], NAMES[2])
+    held = np.zeros(POINTS * DROPS, dtype=bool)
+    for k in (0, 1):
+        held[k * POINTS + POINTS // 2 : (k + 1) * POINTS] = True
+    mean, _ = condition(fit.drops, held, {"ln_p_m": WIDE, EFFECT: SCALE})
+    left = fit.drops.residual[held] - mean
+    assert found.rms[0] == pytest.approx(math.sqrt(np.mean(left**2)), rel=1e-4)
 
 
 def test_drops_miss_by_what_is_expected_of_a_true_model_and_by_more_of_a_wrong_one():
@@ -117,6 +130,7 @@ def test_what_a_prior_and_a_scan_say_of_the_globals_is_drawn_as_well():
 def test_a_single_drop_leaves_nothing_to_check():
     bench, fit = make_fit(1)
     bench.tracks.models = bench.tracks.models[:1]
+    bench.tracks.samples = {NAMES[0]: NAMES[:1]}
     assert check_prediction(bench, fit, np.random.default_rng(1)) == 1.0
 
 

@@ -36,7 +36,8 @@ def set_residuals(scatter: float, seed: int, used: float = 0.02):
         tangents={"ln_p_m": tangent}, covariance=covariance, sections=sections, residual=residual
     )
     campaign = SimpleNamespace(sample=SimpleNamespace(scatter=None))
-    bench = SimpleNamespace(terms=SimpleNamespace(scatter=used), campaign=campaign)
+    tracks = SimpleNamespace(samples={name: [name] for name in sections})
+    bench = SimpleNamespace(terms=SimpleNamespace(scatter=used), campaign=campaign, tracks=tracks)
     return bench, SimpleNamespace(drops=drops)
 
 
