@@ -38,10 +38,8 @@ EFFECTS = {
     "density_gradient": (8.0, {"gradient": 8.0}),
     "pore_gas": (8000.0, {"gas_pressure": 8000.0}),
 }
-OWN, MESH = (
-    (8.0, 11.0, 16.0),
-    (16.0, 12.0),
-)  # spacings, cells in a tip radius; the first of the mesh is the reference
+# spacings, cells in a tip radius; the first of the mesh is the reference
+OWN, MESH = (8.0, 11.0, 16.0), (16.0, 12.0)
 CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "a36"  # for the limits of effects
 
 
@@ -79,7 +77,7 @@ def main() -> None:
     asked = [(*kind, name, speed) for kind in kinds for name in ("", *EFFECTS) for speed in SPEEDS]
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = dict(zip(asked, pool.map(run, asked), strict=True))
-    words = [f"labsim, {cells:g}" for cells in OWN] + [f"mesh, {MESH[1]:g}" for _ in MESH[1:]]
+    words = [f"labsim, {cells:g}" for cells in OWN] + [f"mesh, {cells:g}" for cells in MESH[1:]]
     print("| effect | changes, rms % | off from the mesh, rms %: " + " | ".join(words) + " |")
     print("|---" * (2 + len(words)) + "|")
     for name in EFFECTS:

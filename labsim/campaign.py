@@ -72,8 +72,8 @@ def read_campaign(folder: Path | str) -> Campaign:
         raise CampaignError(folder / "drops", "", "holds no drop; add drops/D01/drop.toml")
     read_scans = [read_scan(path) for path in list_parts(folder / "ct", "scan.toml")]
     scans = tuple(scan for scan in read_scans if isinstance(scan, Scan))
-    drops = _join_records(folder, drops)
     _check_sequence(folder, drops)
+    drops = _join_records(folder, drops)
     strength_tests = read_strength_tests(folder, sample)
     refuse_repeated_records(folder, drops, scans, strength_tests)
     for wanted in planar.calibration_drops:
@@ -325,8 +325,6 @@ def _join_records(folder: Path, drops: tuple[Drop, ...]) -> tuple[Drop, ...]:
 def _check_sequence(folder: Path, drops: tuple[Drop, ...]) -> None:
     seen: dict[int, str] = {}
     for drop in drops:
-        if drop.same_as:
-            continue
         if drop.sequence and drop.sequence in seen:
             raise CampaignError(
                 folder / "drops" / drop.name / "drop.toml",

@@ -96,10 +96,10 @@ def open_workbench(
         features.append(RunFeatures(len(families), table, encode_run))
         felt = any(isinstance(drop, ObservedImpact) for drop in group)
         families.append(Family(projectile, nodes, False, few, felt=felt))
-        speeds = ResponseTable(np.log(nodes), few)
+        blunt = is_blunt(make_profile(projectile))
+        speeds = ResponseTable(np.log(nodes), few, smooth_change=partial(smooth_change, blunt=blunt))
         if felt:
-            smooth = partial(smooth_change, blunt=is_blunt(make_profile(projectile)))
-            of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds, smooth))
+            of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
         models += [
             make_acceleration_model(drop, speeds)
             if isinstance(drop, ObservedImpact)

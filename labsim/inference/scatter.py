@@ -65,12 +65,14 @@ def estimate_scatter(bench: Workbench, fit: Fit) -> ScatterEstimate:
     drops = fit.drops
     tangent = drops.tangents["ln_p_m"]
     used = bench.terms.scatter
+    offsets = np.zeros((len(tangent), len(bench.tracks.samples)))  # one sample's, by columns
+    for column, records in zip(offsets.T, bench.tracks.samples.values(), strict=True):
+        for name in records:
+            column[drops.sections[name]] = tangent[drops.sections[name]]
+    together = offsets @ offsets.T
     value = []
     for scatter in LADDER:
-        covariance = drops.covariance.copy()
-        for records in bench.tracks.samples.values():
-            rows = np.concatenate([np.arange(len(tangent))[drops.sections[name]] for name in records])
-            covariance[np.ix_(rows, rows)] += (scatter**2 - used**2) * np.outer(tangent[rows], tangent[rows])
+        covariance = drops.covariance + (scatter**2 - used**2) * together
         lower = np.linalg.cholesky(covariance)
         white = solve_triangular(lower, np.stack([drops.residual, tangent], axis=1), lower=True)
         information = white[:, 1] @ white[:, 1]

@@ -13,6 +13,7 @@ from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
 from ..records import Campaign, FloatArray
 from ..sph import DropSetting
+from .forward import ResponseTable
 from .grid import (
     COARSE_CELLS,
     Change,
@@ -49,7 +50,7 @@ class Workbench:
     model: Model | None = None  # what the nominal model is extended by
     # what the tables hold already, and codes of the nominal model: encoding a run means seeing it through every scan
     _filled: set[tuple[int, float, str, int | None]] = field(default_factory=set, repr=False)
-    _plain: dict[tuple[int, float, int | None], list[tuple[RunFeatures, FloatArray | None]]] = field(
+    _plain: dict[tuple[int, float, int | None], list[tuple[ResponseTable, FloatArray | None]]] = field(
         default_factory=dict, repr=False
     )
 
@@ -82,27 +83,27 @@ class Workbench:
 
     def _encode(
         self, number: int, index: float, variant: str, cells: int | None
-    ) -> list[tuple[RunFeatures, FloatArray | None]]:
-        """Codes of the runs of one family, (speeds, m), for all that rests on them; None where a run failed."""
+    ) -> list[tuple[ResponseTable, FloatArray | None]]:
+        """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
         return [
-            (each, None if runs is None else np.array([each.encode(run) for run in runs]))
+            (each.table, None if runs is None else np.array([each.encode(run) for run in runs]))
             for each in self.features
             if each.family == number
         ]
 
     def _encode_plain(
         self, number: int, index: float, cells: int | None
-    ) -> list[tuple[RunFeatures, FloatArray | None]]:
+    ) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the nominal model, encoded once."""
         if (number, index, cells) not in self._plain:
             self._plain[number, index, cells] = self._encode(number, index, "", cells)
         return self._plain[number, index, cells]
 
     def _fill_base(self, number: int, index: float) -> None:
-        for features, codes in self._encode_plain(number, index, None):
+        for table, codes in self._encode_plain(number, index, None):
             if codes is not None:
-                features.table.base[index] = codes
+                table.base[index] = codes
 
     def _fill_change(self, number: int, index: float, name: str, amplitude: float, cells: int | None) -> None:
         variant = self._variant(name, amplitude)
@@ -110,13 +111,14 @@ class Workbench:
             return
         self._filled.add((number, index, variant, cells))
         before, after = self._encode_plain(number, index, cells), self._encode(number, index, variant, cells)
-        for (features, codes), (_, plain) in zip(after, before, strict=True):
-            table = features.table
+        for (table, codes), (_, plain) in zip(after, before, strict=True):
             kept = table.changes if cells is None else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
             table.parameters[name] = self.effects[name].amplitudes[0]
             if codes is not None and plain is not None:
-                entry[amplitude] = features.differ(plain, codes)
+                entry[amplitude] = np.array(
+                    [table.smooth(*each) - each[0] for each in zip(plain, codes, strict=True)]
+                )
 
     def state(self, family: Family, name: str = "") -> DropSetting:
         """The nominal model of one family, or of one of its pushes at its own speed, in the middle of the range of p_m."""

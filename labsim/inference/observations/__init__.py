@@ -33,19 +33,11 @@ from .drop_terms import Probe, Terms
 @dataclass(frozen=True)
 class RunFeatures:
     """Runs of one family, (number ``family``), as an observation takes them. encode : the part of a run that it reads -> (m,)
-    features, smooth in ln speed and ln p_m; table : what keeps and interpolates them; smooth : of features and changed ones
-    (m,), (m,) -> the changed ones, their difference as smooth as the solver knows it."""
+    features, smooth in ln speed and ln p_m; table : what keeps and interpolates them."""
 
     family: int
     table: ResponseTable
     encode: Callable[[Any], FloatArray]
-    smooth: Callable[[FloatArray, FloatArray], FloatArray] | None = None
-
-    def differ(self, before: FloatArray, after: FloatArray) -> FloatArray:
-        """(speeds, m): what a change of the model does to the features."""
-        if self.smooth is None:
-            return after - before
-        return np.array([self.smooth(*each) - each[0] for each in zip(before, after, strict=True)])
 
 
 class Observation(Protocol):

@@ -21,7 +21,7 @@ from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph.profile import is_blunt
 from ...sph.tips import make_profile
-from ..curves import decode_speed, smooth_change
+from ..curves import decode_speed
 from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
@@ -110,8 +110,7 @@ class AccelerationModel:
     def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Derivative of ``predict`` by the contact time, m/s³. A blunt tip's force begins with a jump inside a stretch: a slope
         taken there alone would point a contact that is late away from the data, and is taken over a stretch to either side."""
-        stretch = float(np.median(self.observed.end - self.observed.begin))
-        step = stretch if self.blunt else SHORT * stretch
+        step = self._stretch if self.blunt else SHORT * self._stretch
         late = instant._replace(contact_time=instant.contact_time + step)
         early = instant._replace(contact_time=instant.contact_time - step)
         return (self.predict(code, instrument, late) - self.predict(code, instrument, early)) / (2 * step)
@@ -139,10 +138,6 @@ class AccelerationModel:
             f"scale {each.column} {each.range:g}": output * self.observed.sensors[:, k] * each.scale_sigma
             for k, each in enumerate(accelerometer.sensors)
         }
-
-    def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """``moved``, its difference from ``code`` as smooth as the solver knows it."""
-        return smooth_change(code, moved, self.blunt)
 
     def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
         """What the solver's force is off by in all drops: as the tip meets the dust, and later where it goes deeper.
@@ -172,6 +167,11 @@ class AccelerationModel:
         """What the errors of the force are shares of, m/s². By the record, not by the run: errors that shrink with the simulated
         force would be a reason for softer dust."""
         return self._peak * (USUAL_DEPTH * self.radius / self.deepest) ** ROUGHER
+
+    @cached_property
+    def _stretch(self) -> float:
+        """s, usual."""
+        return float(np.median(self.observed.end - self.observed.begin))
 
     @property
     def _peak(self) -> float:
@@ -205,12 +205,13 @@ class AccelerationModel:
         """Nuisances after the best step (contact time, ln speed), and how far that was: in stretches, in per cent."""
         free, speed_width = widths
         seen = self.observed.contact_time
-        stretch = float(np.median(self.observed.end - self.observed.begin))
         # the record shows it: a far model must not run off
-        reach = max(SHOWS_CONTACT * (float(self.observed.end[-1]) - seen), KNOWN * stretch)
+        reach = max(SHOWS_CONTACT * (float(self.observed.end[-1]) - seen), KNOWN * self._stretch)
         contact = float(np.clip(before.contact_time + best[0] * free, seen - reach, seen + reach))
         after = Instant(contact, before.log_speed + best[1] * speed_width, 0.0)
-        return after, max(abs(contact - before.contact_time) / stretch, abs(best[1] * speed_width) * 100)
+        return after, max(
+            abs(contact - before.contact_time) / self._stretch, abs(best[1] * speed_width) * 100
+        )
 
 
 def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:

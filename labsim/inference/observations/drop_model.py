@@ -121,10 +121,6 @@ class DropModel:
 
     unit = "m"
 
-    def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """Depths are smooth."""
-        return moved
-
     def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
         """Nothing beside what all records have."""
         return {}

@@ -122,7 +122,7 @@ def linearise_drop(
     fast_code = model.table.code(lp, faster.log_speed, nominal.amplitudes)
     by_speed = (model.predict(fast_code, instrument, faster) - here) / 1e-3
     strong_code = model.table.code(lp + 1e-2, instant.log_speed, nominal.amplitudes)
-    by_strength = (model.predict(model.smooth(code, strong_code), instrument, instant) - here) / 1e-2
+    by_strength = (model.predict(model.table.smooth(code, strong_code), instrument, instant) - here) / 1e-2
 
     tangents = {"ln_p_m": by_strength}
     for probe, point in probes.items():

@@ -123,10 +123,6 @@ class PushModel:
         }
         return {**profile, "gauge": np.full(self.data.size, gauge.scale_sigma)}
 
-    def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """Depths are smooth."""
-        return moved
-
     def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
         """Nothing beside what all records have."""
         return {}
