@@ -118,9 +118,10 @@ def read_drop(path: Path | str, *, given: Mapping[str, Mapping[str, Any]] | None
     projectile = read_projectile(document.table("projectile"), campaign, led=motion.kind != "free")
     drop = document.table("drop", required=kind != "summary")
     same_as = drop.text("same_as", default="")
-    sequence = drop.number("sequence", 0, 100000, whole=True, default=0) if kind == "summary" or same_as else drop.number(
-        "sequence", 0, 100000, whole=True
-    )  # fmt: skip
+    sequence = 0  # another record has that of its drop
+    if not same_as:
+        missing = {"default": 0} if kind == "summary" else {}
+        sequence = drop.number("sequence", 0, 100000, whole=True, **missing)
     height = drop.measured(
         "height_mm",
         0.0,

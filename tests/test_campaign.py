@@ -266,6 +266,7 @@ def test_another_record_of_a_drop_is_that_drop(campaign: Path) -> None:
     [
         (('same_as = "D01"', 'same_as = "D09"'), r"drop\.same_as.*D09.*no other drop"),
         (('same_as = "D01"', 'same_as = "D01-felt"'), r"drop\.same_as.*no other drop"),
+        (('same_as = "D01"', 'same_as = "D01"\nsequence = 2'), r"drop\.sequence"),
         (("mass_mg = 1", "mass_mg = 2"), r"\[projectile\].*not that of D01"),
     ],
 )
