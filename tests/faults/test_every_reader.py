@@ -42,10 +42,10 @@ def home(mutants: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_mutants_of_every_reader(mutants: ModuleType, home: Path, tmp_path: Path) -> None:
     wrong = []
     for kind in mutants.KINDS:
-        mutants.check_sound(kind, home, tmp_path / "case")
+        cpu = mutants.check_sound(kind, home, tmp_path / "case")
         for k in range(EACH):
             _found, complaint = mutants.try_mutant(
-                kind, home, tmp_path / "case", random.Random(f"tests {kind} {k}")
+                kind, home, tmp_path / "case", random.Random(f"tests {kind} {k}"), cpu
             )
             wrong += [complaint] if complaint else []
     assert not wrong

@@ -26,6 +26,7 @@ class Attempt:
     printed: str
     strays: tuple[str, ...]
     peak: int  # bytes
+    cpu: float  # s
 
     def complaint(self) -> str:
         """What is wrong with this attempt; empty where it succeeded, or failed as it should."""
@@ -93,7 +94,8 @@ def attempt(
     strays = tuple(
         sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
     )
-    return Attempt(os.waitstatus_to_exitcode(result), text, words, strays, usage.ru_maxrss * 1024)
+    cpu = usage.ru_utime + usage.ru_stime
+    return Attempt(os.waitstatus_to_exitcode(result), text, words, strays, usage.ru_maxrss * 1024, cpu)
 
 
 def _survey(root: Path, out: str) -> dict[str, str]:
