@@ -1,11 +1,13 @@
 """Nodes of p_m and amplitudes, and the curves through what is known at them."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from labsim.effects import HalfNormal, LogNormal, Parameter, list_effects
+from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, list_effects
 from labsim.inference.grid import interpolation_weights, smooth_weights, strength_node
 from labsim.inference.nodes import amplitude_nodes, nodes_around
 
@@ -75,3 +77,15 @@ def test_a_small_factor_lies_between_near_ones(value):
     above = int(np.searchsorted(simulated, value))
     assert 0 < above < simulated.size
     assert simulated[above] / simulated[above - 1] < 2.26
+
+
+def test_a_small_amplitude_beside_rough_runs_lies_on_a_curve():
+    """A crust of 0.015 lay on the line from nothing to 0.08, where accelerometers' steps end: its force was off by a tenth."""
+    crust, friction = (
+        Parameter("x", "1", 0.0, limits, Normal(0.0, 0.1), 0.08, "x") for limits in ((-0.03, 1.0), (0.0, 1.0))
+    )
+    hardly = replace(crust, limits=(-0.01, 0.08))
+    for parameter, wanted in ((crust, [0.08, -0.03]), (friction, [0.08, 0.16]), (hardly, [0.08, 0.04])):
+        effect = SimpleNamespace(amplitudes=(parameter,), kind="material")
+        assert amplitude_nodes(effect, 0.015) == pytest.approx([0.08])
+        assert amplitude_nodes(effect, 0.015, bent=True) == pytest.approx(wanted)
