@@ -41,7 +41,8 @@ def doubt_surface_row(drop: Drop, track: Track, curve: DecelerationCurve) -> str
             return None
         if abs(ratio - 1) > max(SCALE_SHARE, 3 * curve.apparent_gravity.sigma / STANDARD_GRAVITY):
             scaled = replace(camera, pixel_size=camera.pixel_size / ratio)
-    found = find_surface_row(track, scaled, drop.projectile.tip_radius)
+    same = curve if scaled is camera else None
+    found = find_surface_row(track, scaled, drop.projectile.tip_radius, same)
     if found is None:
         return None
     sigma = math.hypot(found.sigma, camera.surface_row_sigma)

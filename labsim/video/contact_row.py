@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..errors import MeasurementError
-from ..records import STANDARD_GRAVITY, Camera, FloatArray, Measured, Track
+from ..records import STANDARD_GRAVITY, Camera, DecelerationCurve, FloatArray, Measured, Track
 from .curve import fit_deceleration
 
 LAWS = (  # whether the force grows with the tip's area, powers of the speed in it
@@ -48,20 +48,23 @@ class _Rows:
     gravity: float
 
 
-def find_surface_row(track: Track, camera: Camera, tip_radius: float) -> Measured | None:
+def find_surface_row(
+    track: Track, camera: Camera, tip_radius: float, curve: DecelerationCurve | None = None
+) -> Measured | None:
     """Row (px) at which the tip touches the dust, from the rows and without ``camera.surface_row``; None if they do not tell.
 
     track : frames of free fall and deceleration; camera : scale and frame rate; the stated surface row only starts the search.
-    tip_radius : m, of a hemisphere or sphere. sigma (px) holds the noise of the rows, the choice of the law, and the error of
-    the laws themselves (LAW_BIAS). None where no motion can be fitted, or fewer than 4 frames lie on either side.
+    tip_radius : m, of a hemisphere or sphere; curve : of this track and camera, where it is fitted already. sigma (px) holds
+    the noise of the rows, the choice of the law, and the error of the laws themselves (LAW_BIAS). None where no motion can be
+    fitted, or fewer than 4 frames lie on either side.
     """
     found = None
     for _ in range(ROUNDS):  # outliers and stop depend a little on the row that the fit starts from
-        rows = _take_rows(track, camera, tip_radius)
+        rows = _take_rows(track, camera, tip_radius, curve)
         found = _weigh_laws(rows) if rows is not None else None
         if found is None or abs(found.value - camera.surface_row) < found.sigma:
             break
-        camera = replace(camera, surface_row=found.value)
+        camera, curve = replace(camera, surface_row=found.value), None
     return found
 
 
@@ -89,9 +92,11 @@ def _weigh_laws(rows: _Rows) -> Measured | None:
     return Measured(mean, float(np.hypot(np.sqrt(variance), LAW_BIAS * rows.radius)))
 
 
-def _take_rows(track: Track, camera: Camera, tip_radius: float) -> _Rows | None:
+def _take_rows(
+    track: Track, camera: Camera, tip_radius: float, curve: DecelerationCurve | None
+) -> _Rows | None:
     try:
-        curve = fit_deceleration(track, camera)
+        curve = fit_deceleration(track, camera) if curve is None else curve
     except MeasurementError:
         return None
     assert curve.used is not None and curve.clock is not None

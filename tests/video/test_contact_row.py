@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 
 from labsim.campaign import read_campaign
 from labsim.inference.observe import read_observed_track
-from labsim.records import Camera, Track
+from labsim.records import Camera, DecelerationCurve, Track
 from labsim.video.contact_row import find_surface_row
+from labsim.video.curve import fit_deceleration
 
 RATE, PIXEL, RADIUS = 10_000.0, 20e-6, 0.5e-3
 CAMERA = Camera(RATE, PIXEL, 300.0, 0.15)
@@ -61,6 +62,21 @@ def test_rows_of_an_independent_simulator() -> None:
         sigma.append(found.sigma)
     assert np.max(np.abs(pull)) < 3 and np.sqrt(np.mean(np.square(pull))) < 1.2
     assert np.median(sigma) < 1.2
+
+
+def test_a_curve_that_is_known_is_not_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    track, camera = fall(1, 0.2), replace(CAMERA, surface_row=CAMERA.surface_row + 0.3)
+    wanted = find_surface_row(track, camera, RADIUS)
+    curve, fits = fit_deceleration(track, camera), []
+
+    def count(*given: object) -> DecelerationCurve:
+        fits.append(given)
+        return fit_deceleration(*given)
+
+    monkeypatch.setattr("labsim.video.contact_row.fit_deceleration", count)
+    assert find_surface_row(track, camera, RADIUS, curve) == wanted
+    without = len(fits)
+    assert find_surface_row(track, camera, RADIUS) == wanted and len(fits) - without == without + 1
 
 
 def test_a_track_without_contact_has_no_row() -> None:
