@@ -16,7 +16,7 @@ from ..inference.scatter import ScatterEstimate
 from ..inference.workbench import Workbench
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
-from .drop_views import DropView
+from .drop_views import FELT, DropView
 from .interactive import SIGNS
 from .page import show_number
 from .phrases import add_article, list_names, say_count, say_range, shown_unit, state_p_value
@@ -126,14 +126,22 @@ def describe_calibration(
 def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
     labels = list(views[0].simulated)
     standing = [sum(view.stands_out(label) for view in views) for label in labels]
+    felt = [view.shown is FELT for view in views]
+    records = "records" if any(felt) else "drops"
     parts = [
-        f"with {add_article(label)} {count} of {len(views)} drops"
+        f"with {add_article(label)} {count} of {len(views)} {records}"
         for label, count in zip(labels, standing, strict=True)
     ]
+    frames = "value" if all(felt) else "frame or value" if any(felt) else "frame"
+    above = [
+        *["the projectile went deeper than the simulation says"] * (not all(felt)),
+        *["an accelerometer felt more than the simulation says"] * any(felt),
+    ]
     words = (
-        "A drop stands out where more than one frame in ten lies beyond two standard deviations of what a true model may "
-        f"leave: {', '.join(parts)}. What is left is measured minus simulated: above zero the projectile went deeper than "
-        "the simulation says. Contact time, impact speed and surface row are at their best values, within their errors."
+        f"A {records[:-1]} stands out where more than one {frames} in ten lies beyond two standard deviations of what a true "
+        f"model may leave: {', '.join(parts)}. What is left is measured minus simulated: above zero {', or '.join(above)}. "
+        f"Contact time{', impact speed and surface row' if not all(felt) else ' and impact speed'} are at their best values, "
+        "within their errors."
     )
     rows = []
     for k, view in enumerate(views):

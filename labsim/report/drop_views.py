@@ -36,10 +36,8 @@ class Shown:
     downwards: bool
 
 
-DEPTH = Shown("depth (mm)", 1e3, "measured − fit (µm)", 1e6, "mm", "µm", True)
-FELT = Shown(
-    "acceleration (g)", 1 / STANDARD_GRAVITY, "measured − fit (g)", 1 / STANDARD_GRAVITY, "g", "g", False
-)
+DEPTH = Shown("depth (mm)", 1e3, "residual (µm)", 1e6, "mm", "µm", True)
+FELT = Shown("acceleration (g)", 1 / STANDARD_GRAVITY, "residual (g)", 1 / STANDARD_GRAVITY, "g", "g", False)
 
 
 @dataclass(frozen=True)
