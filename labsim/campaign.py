@@ -318,6 +318,12 @@ def _join_records(folder: Path, drops: tuple[Drop, ...]) -> tuple[Drop, ...]:
                     "record.kind",
                     f'is "{drop.record.kind}" as in {first.name}; another record of a drop is by another instrument',
                 )
+            if drop.height is not None and first.height is not None:
+                raise CampaignError(
+                    file,
+                    "drop.height_mm",
+                    f"stands in {first.name} too, and would count twice; keep it where the camera is",
+                )
             drop = replace(drop, sequence=first.sequence)
         joined.append(drop)
     return tuple(joined)

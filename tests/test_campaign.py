@@ -268,6 +268,10 @@ def test_another_record_of_a_drop_is_that_drop(campaign: Path) -> None:
         (('same_as = "D01"', 'same_as = "D01-felt"'), r"drop\.same_as.*no other drop"),
         (('same_as = "D01"', 'same_as = "D01"\nsequence = 2'), r"drop\.sequence"),
         (("mass_mg = 1", "mass_mg = 2"), r"\[projectile\].*not that of D01"),
+        (
+            ('same_as = "D01"', 'same_as = "D01"\nheight_mm = 4.0\nheight_sigma_mm = 0.1'),
+            r"drop\.height_mm.*D01 too.*count twice",
+        ),
     ],
 )
 def test_a_record_of_another_drop_is_refused(change: tuple[str, str], words: str, campaign: Path) -> None:
