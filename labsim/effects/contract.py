@@ -87,7 +87,10 @@ class Parameter:
         return whole[0] * math.expm1(grade / whole[1]) if whole else grade
 
     def stretch(self, times: float) -> Parameter:
-        """The same parameter with a step that is ``times`` as long by its grade, kept inside the limits."""
+        """The same parameter with a step that is ``times`` as long by its grade, kept inside the limits; a step that doubles what
+        it acts on is long enough."""
+        if math.isfinite(self.doubles):
+            return self
         return replace(self, step=self.hold(self.amplitude_at(times * self.grade(self.step))) - self.null)
 
     @property

@@ -55,7 +55,7 @@ def amplitude_nodes(
 ) -> list[float]:
     """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits;
     ``around``: one more beyond them, so that the curve between two does not depend on the side that the estimate came from;
-    ``bent``: a small amplitude too lies on a curve, through the null and a run on either side, or two on the only one."""
+    ``bent``: a small amplitude too lies on a curve, through half the step on either side, where the limits leave room for it."""
     parameter = effect.amplitudes[0]
     step = parameter.step
     unit = parameter.grade(step)
@@ -64,16 +64,15 @@ def amplitude_nodes(
     def hold(steps: float) -> float:
         return parameter.hold(parameter.amplitude_at(steps * unit)) - parameter.null
 
-    def is_apart(steps: float, near: float) -> bool:
-        held = parameter.grade(hold(steps)) / unit
-        return min(abs(held), abs(held - near)) > APART
+    def is_apart(steps: float) -> bool:
+        return abs(parameter.grade(hold(steps)) / unit) > APART
 
     # of the numerics, much finer runs would cost more than they say
     if abs(place) <= 1.0 or effect.kind == "numerics":
         near = 1.0 if place >= 0 else -1.0
         wanted = [near]
         if bent and effect.kind != "numerics":
-            wanted.append(next((m for m in (-near, 2.0 * near) if is_apart(m, near)), 0.5 * near))
+            wanted += [m for m in (0.5 * near, -0.5 * near) if is_apart(m)]
     else:
         ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
         sign = math.copysign(1.0, place)

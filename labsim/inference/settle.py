@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .fitting import Fit, fit_hypothesis
 from .nodes import nodes_around
 from .workbench import Workbench
 
 LARGE = 0.5  # of an effect's step
+LARGE_CHANGE = (
+    0.1  # of the largest datum of a drop: where accelerometers are, steps are long and change more than that
+)
 MOST_MOVED = 2  # times that runs are made at the amplitude itself
 MOVED = 0.5  # of its standard deviation, that asks for them once more
 
 
 def list_large(bench: Workbench, fit: Fit) -> list[str]:
-    """Effects of a fit that change runs and are larger than LARGE; not those of the numerics, whose runs cost too much."""
+    """Effects of a fit that change runs and are larger than LARGE, or change more of a record than LARGE_CHANGE where runs are
+    rough; not those of the numerics, whose runs cost too much."""
     if any(family.pushed for family in bench.families):
         return []  # what a rate changes of a push is smooth, and runs of amplitudes near each other differ by noise
     return [
@@ -22,8 +28,23 @@ def list_large(bench: Workbench, fit: Fit) -> list[str]:
         for name, value in fit.values.items()
         if bench.costs_runs(name)
         and bench.effects[name].kind != "numerics"
-        and abs(value) > LARGE * abs(bench.effects[name].amplitudes[0].step)
+        and (
+            abs(value) > LARGE * abs(bench.effects[name].amplitudes[0].step)
+            or _change(bench, fit, name) > LARGE_CHANGE
+        )
     ]
+
+
+def _change(bench: Workbench, fit: Fit, name: str) -> float:
+    """What an effect changes, over the largest datum of a drop, the largest over all; nought where no accelerometer is."""
+    if not any(family.felt for family in bench.families):
+        return 0.0
+    changed = fit.drops.tangents[name] * fit.values[name]
+    return max(
+        float(np.max(np.abs(changed[fit.drops.sections[model.observed.name]][: model.data.size])))
+        / float(np.max(np.abs(model.data)))
+        for model in bench.tracks.models
+    )
 
 
 def settle(bench: Workbench, fit: Fit) -> Fit:

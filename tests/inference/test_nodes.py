@@ -85,7 +85,18 @@ def test_a_small_amplitude_beside_rough_runs_lies_on_a_curve():
         Parameter("x", "1", 0.0, limits, Normal(0.0, 0.1), 0.08, "x") for limits in ((-0.03, 1.0), (0.0, 1.0))
     )
     hardly = replace(crust, limits=(-0.01, 0.08))
-    for parameter, wanted in ((crust, [0.08, -0.03]), (friction, [0.08, 0.16]), (hardly, [0.08, 0.04])):
+    for parameter, wanted in (
+        (crust, [0.08, 0.04, -0.03]),
+        (friction, [0.08, 0.04]),
+        (hardly, [0.08, 0.04]),
+    ):
         effect = SimpleNamespace(amplitudes=(parameter,), kind="material")
         assert amplitude_nodes(effect, 0.015) == pytest.approx([0.08])
         assert amplitude_nodes(effect, 0.015, bent=True) == pytest.approx(wanted)
+
+
+def test_a_step_that_doubles_a_strength_is_not_made_longer():
+    """Four such steps make it fourteen times as strong; halfway there the force was off by a third."""
+    eta = list_effects(None)["strength_rate"].amplitudes[0]
+    assert eta.stretch(4.0) == eta
+    assert FACTOR.stretch(2.0).step == pytest.approx(1.5**2 - 1.0)
