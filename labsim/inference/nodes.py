@@ -7,8 +7,6 @@ import math
 from ..effects import Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
-APART = 0.25  # of a step: nearer runs say more of their noise than of the curve
-
 
 def place_strength(log_p_m: float) -> float:
     """Where a strength lies among the nodes: an integer at a node."""
@@ -55,24 +53,17 @@ def amplitude_nodes(
 ) -> list[float]:
     """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits;
     ``around``: one more beyond them, so that the curve between two does not depend on the side that the estimate came from;
-    ``bent``: a small amplitude too lies on a curve, through half the step on either side, where the limits leave room for it."""
+    ``bent``: a small amplitude too lies on a curve, through half the step."""
     parameter = effect.amplitudes[0]
     step = parameter.step
     unit = parameter.grade(step)
     place = parameter.grade(amplitude) / unit
-
-    def hold(steps: float) -> float:
-        return parameter.hold(parameter.amplitude_at(steps * unit)) - parameter.null
-
-    def is_apart(steps: float) -> bool:
-        return abs(parameter.grade(hold(steps)) / unit) > APART
-
     # of the numerics, much finer runs would cost more than they say
     if abs(place) <= 1.0 or effect.kind == "numerics":
         near = 1.0 if place >= 0 else -1.0
         wanted = [near]
         if bent and effect.kind != "numerics":
-            wanted += [m for m in (0.5 * near, -0.5 * near) if is_apart(m)]
+            wanted.append(0.5 * near)
     else:
         ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
         sign = math.copysign(1.0, place)
@@ -81,7 +72,7 @@ def amplitude_nodes(
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
     nodes = []
     for m in wanted:
-        value = hold(m)
+        value = parameter.hold(parameter.amplitude_at(m * unit)) - parameter.null
         if value == 0.0:  # the limit is the null on that side
             value = step
         if value not in nodes:
