@@ -16,38 +16,27 @@ import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from effect_roughness import CAMPAIGN, P_M, RADIUS, SPEEDS, mesh
+from effect_roughness import CAMPAIGN, SPEEDS, lay_out
 
 from labsim.campaign import read_campaign
-from labsim.effects import list_effects, list_places
+from labsim.effects import list_effects
 from labsim.inference.curves import decode_speed, encode_speeds
 from labsim.inference.grid import FELT_CELLS, FELT_STEPS, smooth_weights
 from labsim.inference.nodes import amplitude_nodes
 from labsim.inference.observe_acceleration import BINS, COMPARED
-from labsim.records import Material, Projectile
-from labsim.sph import DropSetting, simulate
+from labsim.sph import simulate
 
 EFFECTS = (
     "strength_rate", "shear_strength", "tensile_strength", "strength_slope", "surface_crust", "pore_gas",
     "density_gradient", "side_friction",
 )  # fmt: skip
 SHARES = (0.1, 0.25, 0.5, 0.75)
-MASS = mesh.BEAD_DENSITY * 4 / 3 * math.pi * RADIUS**3
 
 
 def run(asked: tuple[str, float, float]) -> np.ndarray:
     """Encoded speeds with (effect or nothing, amplitude, speed)."""
     name, amplitude, speed = asked
-    setting = DropSetting(
-        Projectile("hemisphere", RADIUS, MASS), speed, Material(p_m=P_M), spacing=RADIUS / FELT_CELLS
-    )
-    if name:
-        campaign = read_campaign(CAMPAIGN)
-        effect = list_effects(campaign)[name]
-        parameter = effect.amplitudes[0]
-        place = next(iter(list_places(campaign).values()))
-        setting = effect.apply(setting, {parameter.name: parameter.null + amplitude}, place)
-    return encode_speeds(simulate(setting))
+    return encode_speeds(simulate(lay_out(FELT_CELLS, name, amplitude, speed)))
 
 
 def find_force(code: np.ndarray, stop: float) -> np.ndarray:
@@ -65,19 +54,16 @@ def main() -> None:
     workers = parser.parse_args().workers
     catalogue = list_effects(read_campaign(CAMPAIGN))
     effects = {name: catalogue[name].stretch(FELT_STEPS) for name in EFFECTS}
-    places, lines, curves = {}, {}, {}
+    places = {}
     for name, effect in effects.items():
         parameter = effect.amplitudes[0]
-        unit = parameter.grade(parameter.step)
-        places[name] = [parameter.amplitude_at(share * unit) for share in SHARES]
-        lines[name] = {a: amplitude_nodes(effect, a) for a in places[name]}
-        curves[name] = {a: amplitude_nodes(effect, a, bent=True) for a in places[name]}
+        places[name] = [parameter.amplitude_at(share * parameter.grade(parameter.step)) for share in SHARES]
     amplitudes = {
-        name: sorted({*places[name], *(node for a in places[name] for node in curves[name][a])})
-        for name in EFFECTS
+        name: {*places[name], *(node for a in places[name] for node in amplitude_nodes(effect, a, bent=True))}
+        for name, effect in effects.items()
     }
     asked = [("", 0.0, speed) for speed in SPEEDS]
-    asked += [(name, a, speed) for name in EFFECTS for a in amplitudes[name] for speed in SPEEDS]
+    asked += [(name, a, speed) for name in EFFECTS for a in sorted(amplitudes[name]) for speed in SPEEDS]
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         codes = dict(zip(asked, pool.map(run, asked), strict=True))
     print("| effect | at | changes | off on a line | on the curve |\n|---|---|---|---|---|")
@@ -89,7 +75,8 @@ def main() -> None:
                 plain, true = codes["", 0.0, speed], codes[name, a, speed]
                 stop = math.exp(min(plain[1], true[1]))
                 found = [find_force(plain, stop)]
-                for nodes in (lines[name][a], curves[name][a]):
+                for bent in (False, True):
+                    nodes = amplitude_nodes(effect, a, bent=bent)
                     grades = [0.0, *map(parameter.grade, nodes)]
                     runs = np.array([plain, *(codes[name, node, speed] for node in nodes)])
                     found.append(find_force(smooth_weights(grades, parameter.grade(a)) @ runs, stop))

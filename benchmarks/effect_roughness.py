@@ -30,6 +30,7 @@ import mesh
 from acceleration_error import bin_force
 
 RADIUS, P_M, SPEEDS = 0.75e-3, 2200.0, (0.26, 0.32, 0.38)  # m, Pa, m/s
+MASS = mesh.BEAD_DENSITY * 4 / 3 * math.pi * RADIUS**3
 # effect: its amplitude above null, and the same in the mesh's words
 EFFECTS = {
     "tensile_strength": (4.06, {"tensile_factor": 5.06}),
@@ -43,25 +44,30 @@ OWN, MESH = (8.0, 11.0, 16.0), (16.0, 12.0)
 CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "a36"  # for the limits of effects
 
 
+def lay_out(cells: float, name: str, amplitude: float, speed: float) -> DropSetting:
+    """A drop with (effect or nothing, its amplitude above null)."""
+    setting = DropSetting(
+        Projectile("hemisphere", RADIUS, MASS), speed, Material(p_m=P_M), spacing=RADIUS / cells
+    )
+    if not name:
+        return setting
+    campaign = read_campaign(CAMPAIGN)
+    effect = list_effects(campaign)[name]
+    parameter = effect.amplitudes[0]
+    place = next(iter(list_places(campaign).values()))
+    return effect.apply(setting, {parameter.name: parameter.null + amplitude}, place)
+
+
 def run(asked: tuple[bool, float, str, float]) -> np.ndarray:
     """Deceleration over its mean of (own, cells, effect or nothing, speed)."""
     own, cells, name, speed = asked
-    mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * RADIUS**3
     if own:
-        campaign = read_campaign(CAMPAIGN)
-        setting = DropSetting(
-            Projectile("hemisphere", RADIUS, mass), speed, Material(p_m=P_M), spacing=RADIUS / cells
-        )
-        if name:
-            effect = list_effects(campaign)[name]
-            parameter = effect.amplitudes[0]
-            place = next(iter(list_places(campaign).values()))
-            setting = effect.apply(setting, {parameter.name: parameter.null + EFFECTS[name][0]}, place)
+        setting = lay_out(cells, name, EFFECTS[name][0] if name else 0.0, speed)
         code = encode_speeds(simulate(setting))
         force = bin_force(lambda t: decode_speed(code, t), math.exp(code[1]))
     else:
         dust = mesh.Dust(p_m=P_M, **(EFFECTS[name][1] if name else {}))
-        found = mesh.run_drop(dust, RADIUS, speed, mesh.Numerics(cells=cells), mass=mass)
+        found = mesh.run_drop(dust, RADIUS, speed, mesh.Numerics(cells=cells), mass=MASS)
         force = bin_force(lambda t: np.interp(t, found.time, found.speed), found.stopping_time)
     force = force[: round(COMPARED * BINS)]
     return force / force.mean()

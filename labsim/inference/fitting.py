@@ -184,14 +184,13 @@ def _ask(
     if around:
         indices = nodes_around(log_p_m)
         bench.require_base(indices)
-    # steps are large where accelerometers are, and a crust of a fifth of one, on a straight line, was off by a tenth of itself
-    felt = any(family.felt for family in bench.families)
     wanted = [
         (name, amplitude, index)
         for name in hypothesis
         if bench.costs_runs(name)
+        # on a straight line a crust of a fifth of a long step is off by a tenth of itself
         for amplitude in amplitude_nodes(
-            bench.effects[name], values[name], coarse=coarse, around=around, bent=felt
+            bench.effects[name], values[name], coarse=coarse, around=around, bent=bench.felt
         )
         for index in indices
     ]

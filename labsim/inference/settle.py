@@ -11,9 +11,7 @@ from .nodes import nodes_around
 from .workbench import Workbench
 
 LARGE = 0.5  # of an effect's step
-LARGE_CHANGE = (
-    0.1  # of the largest datum of a drop: where accelerometers are, steps are long and change more than that
-)
+LARGE_CHANGE = 0.1  # of the largest datum of a drop, where accelerometers are and steps are long
 MOST_MOVED = 2  # times that runs are made at the amplitude itself
 MOVED = 0.5  # of its standard deviation, that asks for them once more
 
@@ -37,7 +35,7 @@ def list_large(bench: Workbench, fit: Fit) -> list[str]:
 
 def _change(bench: Workbench, fit: Fit, name: str) -> float:
     """What an effect changes, over the largest datum of a drop, the largest over all; nought where no accelerometer is."""
-    if not any(family.felt for family in bench.families):
+    if not bench.felt:
         return 0.0
     changed = fit.drops.tangents[name] * fit.values[name]
     return max(

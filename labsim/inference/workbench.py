@@ -77,6 +77,11 @@ class Workbench:
         return self.layering.dust if self.layering else ()
 
     @property
+    def felt(self) -> bool:
+        """Whether an accelerometer is on some drops: runs are rough there, and steps of effects long."""
+        return any(family.felt for family in self.families)
+
+    @property
     def features(self) -> list[RunFeatures]:
         """What all observations take of runs."""
         return [each for observation in self.observations for each in observation.features]

@@ -16,7 +16,7 @@ from ..inference.scatter import ScatterEstimate
 from ..inference.workbench import Workbench
 from ..records import Campaign, Drop
 from .campaign_figures import say_projectile
-from .drop_views import FELT, DropView
+from .drop_views import DEPTH, FELT, DropView
 from .interactive import SIGNS
 from .page import show_number
 from .phrases import add_article, list_names, say_count, say_range, shown_unit, state_p_value
@@ -126,22 +126,17 @@ def describe_calibration(
 def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
     labels = list(views[0].simulated)
     standing = [sum(view.stands_out(label) for view in views) for label in labels]
-    felt = [view.shown is FELT for view in views]
-    records = "records" if any(felt) else "drops"
+    shown = [each for each in (DEPTH, FELT) if any(view.shown is each for view in views)]
+    record = "record" if FELT in shown else "drop"
     parts = [
-        f"with {add_article(label)} {count} of {len(views)} {records}"
+        f"with {add_article(label)} {count} of {len(views)} {record}s"
         for label, count in zip(labels, standing, strict=True)
     ]
-    frames = "value" if all(felt) else "frame or value" if any(felt) else "frame"
-    above = [
-        *["the projectile went deeper than the simulation says"] * (not all(felt)),
-        *["an accelerometer felt more than the simulation says"] * any(felt),
-    ]
     words = (
-        f"A {records[:-1]} stands out where more than one {frames} in ten lies beyond two standard deviations of what a true "
-        f"model may leave: {', '.join(parts)}. What is left is measured minus simulated: above zero {', or '.join(above)}. "
-        f"Contact time{', impact speed and surface row' if not all(felt) else ' and impact speed'} are at their best values, "
-        "within their errors."
+        f"A {record} stands out where more than one {' or '.join(each.datum for each in shown)} in ten lies beyond two standard "
+        f"deviations of what a true model may leave: {', '.join(parts)}. What is left is measured minus simulated: above zero "
+        f"{', or '.join(each.above for each in shown)}. {shown[0].free.capitalize()} are at their best values, within their "
+        "errors."
     )
     rows = []
     for k, view in enumerate(views):

@@ -25,7 +25,8 @@ STOP_FRAMES = 3  # the last frames whose mean stands for the depth at the stop
 
 @dataclass(frozen=True)
 class Shown:
-    """Words and factors of what is drawn against time: the quantity, and what is left of it."""
+    """Words and factors of what is drawn against time: the quantity, and what is left of it; datum : one of them; above : what
+    it means where more is measured than simulated; free : what is at its best value."""
 
     label: str
     factor: float
@@ -34,10 +35,19 @@ class Shown:
     unit: str
     left_unit: str
     downwards: bool
+    datum: str
+    above: str
+    free: str
 
 
-DEPTH = Shown("depth (mm)", 1e3, "residual (µm)", 1e6, "mm", "µm", True)
-FELT = Shown("acceleration (g)", 1 / STANDARD_GRAVITY, "residual (g)", 1 / STANDARD_GRAVITY, "g", "g", False)
+DEPTH = Shown(
+    "depth (mm)", 1e3, "residual (µm)", 1e6, "mm", "µm", True,
+    "frame", "the projectile went deeper than the simulation says", "contact time, impact speed and surface row",
+)  # fmt: skip
+FELT = Shown(
+    "acceleration (g)", 1 / STANDARD_GRAVITY, "residual (g)", 1 / STANDARD_GRAVITY, "g", "g", False,
+    "value", "an accelerometer felt more than the simulation says", "contact time and impact speed",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def test_a_small_factor_lies_between_near_ones(value):
 
 
 def test_a_small_amplitude_beside_rough_runs_lies_on_a_curve():
-    """A crust of 0.015 lay on the line from nothing to 0.08, where accelerometers' steps end: its force was off by a tenth."""
+    """On the line from nothing to 0.08, where accelerometers' steps end, a crust of 0.015 is off by a tenth of itself."""
     crust = SimpleNamespace(
         amplitudes=(Parameter("x", "1", 0.0, (-0.03, 1.0), Normal(0.0, 0.1), 0.08, "x"),), kind="material"
     )
@@ -90,7 +90,7 @@ def test_a_small_amplitude_beside_rough_runs_lies_on_a_curve():
 
 
 def test_a_step_that_doubles_a_strength_is_not_made_longer():
-    """Four such steps make it fourteen times as strong; halfway there the force was off by a third."""
+    """Four such steps make it fourteen times as strong; halfway there a line is off by 3 % of the largest force."""
     eta = list_effects(None)["strength_rate"].amplitudes[0]
     assert eta.stretch(4.0) == eta
     assert FACTOR.stretch(2.0).step == pytest.approx(1.5**2 - 1.0)

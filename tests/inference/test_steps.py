@@ -29,7 +29,7 @@ def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
     monkeypatch.setattr(steps, "linearise_at", linearise)
     return SimpleNamespace(
         campaign=SimpleNamespace(p_m_range=RANGE),
-        families=(),
+        felt=False,
         effects={"effect": SimpleNamespace(amplitudes=[parameter])},
         observations=[SimpleNamespace(begin=lambda: np.empty(0), follow=lambda own, block, left: (own, 0.0))],
         shape_evidence={},
