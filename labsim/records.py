@@ -142,12 +142,14 @@ class Sensor:
 @dataclass(frozen=True)
 class Accelerometer:
     """What stands on the projectile. time_column : of a table, "" where the format has a clock; sensors : of one record, finest
-    range first; unit : m/s² of one of its numbers; reads_at_rest : m/s² upwards, gravity or nothing."""
+    range first; unit : m/s² of one of its numbers; reads_at_rest : m/s² upwards, gravity or nothing; window : s on the
+    record's clock, of the drop."""
 
     time_column: str
     sensors: tuple[Sensor, ...]
     unit: float
     reads_at_rest: float
+    window: tuple[float, float] = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)

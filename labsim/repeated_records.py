@@ -6,6 +6,7 @@ Noise never repeats, so that rows which agree to the last digit, or files which 
 from __future__ import annotations
 
 import filecmp
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from .errors import CampaignError, MeasurementError
 from .records import Drop, Scan, StrengthTest
 from .tracks import read_rows
 
+ALL = (-math.inf, math.inf)  # s: a record without a window
+
 
 def refuse_repeated_records(
     campaign: Path, drops: Sequence[Drop], scans: Sequence[Scan], tests: Sequence[StrengthTest]
@@ -22,7 +25,8 @@ def refuse_repeated_records(
     """Raise CampaignError where two drops, two scans or two strength tests are one measurement.
 
     Tracks are compared by their rows, whatever their frame numbers, columns, digits and line ends (one file of another program
-    may hold the tracks of several drops); videos, pictures and slices byte for byte.
+    may hold the tracks of several drops); videos, pictures and slices byte for byte; so are the recordings of accelerometers
+    whose windows overlap.
     """
     tracks: list[tuple[Path, Path, Drop]] = []
     videos: list[tuple[Path, Path, Drop]] = []
@@ -31,8 +35,8 @@ def refuse_repeated_records(
             toml = campaign / "drops" / drop.name / "drop.toml"
             (tracks if drop.record.kind == "track" else videos).append((toml, drop.record.path, drop))
     _compare_rows(tracks)
-    _compare_files([(toml, path) for toml, path, _ in videos], "record.file")
-    slices = [(campaign / "ct" / scan.name / "scan.toml", scan.slices) for scan in scans]
+    _compare_files([(toml, path, _find_window(drop)) for toml, path, drop in videos], "record.file")
+    slices = [(campaign / "ct" / scan.name / "scan.toml", scan.slices, ALL) for scan in scans]
     _compare_files(slices, "scan.slices")
     seen: dict[tuple[tuple[float, float], ...], str] = {}
     for test in tests:
@@ -55,16 +59,21 @@ def _compare_rows(tracks: Sequence[tuple[Path, Path, Drop]]) -> None:
             raise _repeat(toml, "record.file", f"{path} has the same {row.size} rows as", earlier)
 
 
-def _compare_files(records: Sequence[tuple[Path, Path]], key: str) -> None:
-    """Sizes first; only where all are the same, bytes, up to the first that differs."""
-    alike: dict[tuple[int, ...], list[tuple[Path, Path, list[Path]]]] = {}
-    for toml, record in records:
+def _find_window(drop: Drop) -> tuple[float, float]:
+    return ALL if drop.accelerometer is None else drop.accelerometer.window
+
+
+def _compare_files(records: Sequence[tuple[Path, Path, tuple[float, float]]], key: str) -> None:
+    """Sizes first; only where all are the same, bytes, up to the first that differs. Windows apart are two records."""
+    alike: dict[tuple[int, ...], list[tuple[Path, Path, tuple[float, float], list[Path]]]] = {}
+    for toml, record, window in records:
         files = _list_files(record)
         same_sizes = alike.setdefault(tuple(file.stat().st_size for file in files), [])
-        for earlier, earlier_record, earlier_files in same_sizes:
-            if files and all(map(_same_bytes, files, earlier_files)):
+        for earlier, earlier_record, other, earlier_files in same_sizes:
+            apart = window[1] <= other[0] or other[1] <= window[0]
+            if files and not apart and all(map(_same_bytes, files, earlier_files)):
                 raise _repeat(toml, key, f"{record} holds the same bytes as", (earlier, earlier_record))
-        same_sizes.append((toml, record, files))
+        same_sizes.append((toml, record, window, files))
 
 
 def _repeat(toml: Path, key: str, said: str, earlier: tuple[Path, Path]) -> CampaignError:

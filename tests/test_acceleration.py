@@ -49,6 +49,51 @@ def test_depth_speed_contact_and_stop_of_a_known_motion(tmp_path: Path) -> None:
     assert not impact.warnings
 
 
+def test_a_rebound_has_its_speed_and_none_is_none(tmp_path: Path) -> None:
+    plain = look(read_campaign(make(tmp_path / "none")))
+    assert abs(plain.rebound_speed.value) < 3 * plain.rebound_speed.sigma
+    folder = make(tmp_path / "back")
+    time, felt, contact = accelerations.make_pulse(*SHAPE)
+    _, stop = move(SHAPE[0] * 1e-3, SHAPE[1] * 1e-6, SHAPE[2], 1300.0)
+    pushed = (time > contact + stop) & (time < contact + 1.5 * stop)
+    speed = 0.2 * SHAPE[2]
+    back = np.where(pushed, felt + speed / (pushed.sum() * (time[1] - time[0])) / accelerations.G, felt)
+    accelerations.write_record(folder / "drops" / "D01", time, back)
+    campaign = read_campaign(folder)
+    rebound = look(campaign).rebound_speed
+    assert abs(rebound.value - speed) < 3 * rebound.sigma
+    assert rebound.value > 5 * rebound.sigma
+    assert "up again" in inspect_drop(campaign.drops[0], campaign).line
+
+
+def test_several_drops_of_one_recording_each_take_their_window(tmp_path: Path) -> None:
+    alone = look(read_campaign(make(tmp_path / "alone")))
+    folder = make(tmp_path / "several")
+    time, felt, _ = accelerations.make_pulse(*SHAPE)
+    length = time[-1] + time[0]
+    whole = np.concatenate([time, time + length, time + 2 * length])
+    accelerations.write_record(
+        folder / "drops" / "D01", whole, np.concatenate([0.5 * felt, felt, 1.2 * felt])
+    )
+    edit(folder, 'kind = "acceleration"', f'kind = "acceleration"\nwindow_s = [{length}, {2 * length}]')
+    campaign = read_campaign(folder)
+    impact = look(campaign)
+    assert impact.contact_time - length == pytest.approx(alone.contact_time, abs=1e-4)
+    assert impact.penetration_depth.value == pytest.approx(alone.penetration_depth.value, rel=0.02)
+    # the same file for another drop, from its own folder: another window is another measurement, an overlapping one is not
+    (folder / "drops" / "D02").mkdir()
+    text = (folder / "drops" / "D01" / "drop.toml").read_text().replace("sequence = 1", "sequence = 2")
+    text = text.replace('"acceleration.csv"', '"../D01/acceleration.csv"')
+    other = folder / "drops" / "D02" / "drop.toml"
+    other.write_text(text)
+    with pytest.raises(CampaignError, match="one measurement counts once"):
+        read_campaign(folder)
+    other.write_text(text.replace(f"[{length}, {2 * length}]", f"[{2 * length}, {3 * length}]"))
+    second = read_campaign(folder).drops[1]
+    found = find_impact(read_acceleration(second.record.path, second.accelerometer), second)
+    assert found.contact_time - 2 * length == pytest.approx(alone.contact_time, abs=1e-4)
+
+
 @pytest.mark.parametrize("zero", [-0.13, 0.13, 0.15])
 def test_a_sensor_of_little_noise_may_have_its_zero_off(tmp_path: Path, zero: float) -> None:
     """By three of its stated errors and a hundred times the noise; the blow is weak beside that."""
@@ -90,6 +135,10 @@ def test_the_depth_has_the_error_that_scale_and_zero_leave(tmp_path: Path) -> No
         ('"time_s"', '"a_g"', ""),
         ("offset_sigma = 0.05", "offset_sigma = [0.05, 0.1]", "record.offset_sigma"),
         ("scale_sigma = 0.01", "scale_sigma = -0.01", "record.scale_sigma"),
+        ("sigma = 0.01", "sigma = 0.01\nwindow_s = 3", "record.window_s"),
+        ("sigma = 0.01", "sigma = 0.01\nwindow_s = [3, 2]", "record.window_s"),
+        ("sigma = 0.01", "sigma = 0.01\nwindow_s = [300, 400]", "record.window_s"),
+        ("sigma = 0.01", "sigma = 0.01\nwindow_s = [0.001, 0.03]", "a_g"),
         ("[record]", "[camera]\nframe_rate_Hz = 1e4\n[record]", "[camera]"),
     ],
 )

@@ -34,6 +34,8 @@ SERIES = (
     (1.5e-3, 2.5, 0.22),
 )
 PIXELS = 0.03  # of a film, in tip radii
+# filling factors of the rows of a static test: a sample pulled apart a row, a sample squeezed all the way
+ROWS = {"tension": np.linspace(0.16, 0.40, 6), "compression_omnidirectional": np.linspace(0.14, 0.52, 25)}
 RATES, NOISES = (2e3, 50e3), (0.001, 0.02)  # Hz; over the peak: drawn between, evenly in the logarithm
 
 
@@ -90,9 +92,8 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
             }
         truth = Dust(p_m=hidden["pm"], **labelled.set_dust(hidden))
         for kind, sigma in hidden.get("tests", {}).items():
-            rows = np.linspace(0.16, 0.40, 6)
-            stress = [find_strengths(phi, truth.law)[kind == "tension"] for phi in rows]
-            labelled.write_test(folder / "strength" / kind, kind, rows, np.array(stress), sigma, beside)
+            stress = [find_strengths(phi, truth.law)[kind == "tension"] for phi in ROWS[kind]]
+            labelled.write_test(folder / "strength" / kind, kind, ROWS[kind], np.array(stress), sigma, beside)
         nominal_dust = Dust()
         labelled.write_sample(
             folder,

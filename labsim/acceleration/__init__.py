@@ -80,6 +80,9 @@ class Impact:
     depth_sigma: FloatArray
     stopping_time: float  # s, NaN where the record ends before
     penetration_depth: Measured
+    rebound_speed: (
+        Measured  # m/s, upwards, the largest up to twice the stopping time; NaN where the record ends before
+    )
     warnings: tuple[str, ...]
 
 
@@ -114,7 +117,22 @@ def read_accelerometer(table: Table) -> Accelerometer:
         tuple(sorted(sensors, key=lambda each: each.range)),
         unit,
         at_rest * STANDARD_GRAVITY,
+        _read_window(table),
     )
+
+
+def _read_window(table: Table) -> tuple[float, float]:
+    """The seconds on the record's clock that are this drop's; all where none are stated."""
+    window = table.get("window_s", None)
+    if window is None:
+        return -math.inf, math.inf
+    if not isinstance(window, list) or len(window) != 2:
+        raise table.wrong("window_s", f"{window!r} is not a range; write two times as [12.3, 12.8]")
+    for value in window:
+        table.check_number("window_s", value, -LARGEST, LARGEST)
+    if not window[0] < window[1]:
+        raise table.wrong("window_s", f"{window} does not grow; write the earlier time first")
+    return float(window[0]), float(window[1])
 
 
 def _each(
@@ -165,6 +183,16 @@ def _read(path: Path, accelerometer: Accelerometer) -> Readings:
         raise MeasurementError(
             path, "record.file", f"has {found.time.size} samples; an impact takes {FEWEST} or more"
         )
+    begin, end = accelerometer.window
+    inside = (found.time >= begin) & (found.time <= end)
+    if inside.sum() < FEWEST:
+        raise MeasurementError(
+            path,
+            "record.window_s",
+            f"holds {inside.sum()} samples of a record from {found.time.min():g} to {found.time.max():g} s; an impact takes "
+            f"{FEWEST} or more",
+        )
+    found = Readings(found.time[inside], found.values[inside], found.ranges)
     largest = float(np.nanmax(np.abs(found.values), initial=0.0)) / accelerometer.unit
     if max(largest, float(np.abs(found.time).max())) > LARGEST:
         raise MeasurementError(
@@ -317,7 +345,10 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
         (speed.sigma * clock) ** 2 + (0.5 * zero_sigma * clock**2) ** 2 + (scale * fall) ** 2
         + (record.sigma[min(first, felt.size - 1)] ** 2 * record.step * np.maximum(clock, 0.0) ** 3 / 3)
     )  # fmt: skip
-    rest = Measured(math.nan, math.nan)
+    rest = rebound = Measured(math.nan, math.nan)
+    if stopped.size and clock[-1] >= 2.0 * stop:
+        at = last + int(np.argmin(velocity[last : int(np.searchsorted(clock, 2.0 * stop))]))
+        rebound = Measured(float(-velocity[at]), float(doubt[at]))
     if stopped.size:
         after = felt[first:][clock[1:] > 2.0 * stop]
         if after.size >= 10:
@@ -352,7 +383,7 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     return Impact(
         contact, released, flight, rest, flight_speed, speed, source,
         clock[: last + 1], velocity[: last + 1], depth[: last + 1], depth_sigma[: last + 1],
-        stop, Measured(float(depth[last]), float(depth_sigma[last])), tuple(warnings),
+        stop, Measured(float(depth[last]), float(depth_sigma[last])), rebound, tuple(warnings),
     )  # fmt: skip
 
 

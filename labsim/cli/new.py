@@ -87,6 +87,7 @@ row_sigma_px = 0.1                  # optional: standard error of a row
 # offset_sigma = 0.05                 # how well the zero is known
 # scale_sigma = 0.01                  # how well the scale is known, relative
 # range = 50.0                        # optional: largest reading
+# window_s = [12.30, 12.80]           # optional: the seconds that are this drop's, where one file holds several
 # [drop] then also takes impact_speed_m_s and impact_speed_sigma_m_s, and height_mm is optional
 
 # [record]                          # instead: a tip pushed into the ground with a gauge; then without [camera] and height_mm

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..acceleration import find_impact, read_acceleration
+from ..acceleration import SEEN, find_impact, read_acceleration
 from ..errors import LabsimError
 from ..force import ForceRecord, read_force
 from ..inference.observe import read_observed_track
@@ -167,11 +167,17 @@ def _inspect_acceleration(drop: Drop, size: str) -> Found:
         return Found(drop.name, f"{size}: no impact can be read", trouble=trouble)
     peak = float(record.felt.max())
     depth, stopped = impact.penetration_depth, math.isfinite(impact.stopping_time)
+    back = impact.rebound_speed  # NaN where it is not seen, and then no comparison holds
     found = Found(
         drop.name,
         f"{size}: {record.time.size} samples, {impact.impact_speed.value:.3f} m/s at contact ({impact.speed_source}), at most "
         f"{peak / STANDARD_GRAVITY:.3g} g, {depth.value * 1e3:.3f} ± {depth.sigma * 1e3:.3f} mm deep "
-        + (f"after {impact.stopping_time * 1e3:.2f} ms" if stopped else "where it ends"),
+        + (f"after {impact.stopping_time * 1e3:.2f} ms" if stopped else "where it ends")
+        + (
+            f", up again with {back.value:.3f} ± {back.sigma:.3f} m/s"
+            if back.value > SEEN * back.sigma
+            else ""
+        ),
         {
             "samples": int(record.time.size),
             "samples_saturated": record.saturated,
@@ -181,6 +187,8 @@ def _inspect_acceleration(drop: Drop, size: str) -> Found:
             "penetration_depth_m": depth.value if stopped else None,
             "penetration_depth_sigma_m": depth.sigma if stopped else None,
             "stopping_time_s": impact.stopping_time if stopped else None,
+            "rebound_speed_m_s": None if math.isnan(back.value) else back.value,
+            "rebound_speed_sigma_m_s": None if math.isnan(back.value) else back.sigma,
         },
     )
     found.odd += impact.warnings
