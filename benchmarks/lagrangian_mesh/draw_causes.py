@@ -5,7 +5,7 @@
 
 The campaigns named have nothing hidden. Of each a cause is drawn that is SIGMAS standard deviations strong: to the same drops
 without noise, its square is how much lower χ² of the best fit is with the cause than without. Where no size inside the cause's
-limits does, another is drawn. The plan's twin has it, with the same seed and with noise.
+limits, and within LIKELY of its prior, does, another is drawn. The plan's twin has it, with the same seed and with noise.
 """
 
 from __future__ import annotations
@@ -39,26 +39,31 @@ CAUSES = (
     "strength_rate", "shear_strength", "tensile_strength", "pore_gas", "side_friction", "sample_drift",
     "density_gradient", "projectile_mass", "strength_slope", "surface_crust",
 )  # fmt: skip
+LIKELY = 0.0013  # on either side of the prior: three standard deviations of a normal one
 WEAKEST = 0.2  # of K0, Δ, factors: what the mesh still follows
 SOFTEST = -0.027  # of φ in a crust: dust has no strength at φ1
 
 
 def hide(name: str, effect: Effect, size: float, rng: np.random.Generator) -> tuple[dict, float] | None:
     """Keys of a campaign in a plan, and the effect's amplitude; None where a cause of this size (its sign counts) is none."""
-    parameter = effect.amplitudes[0]
+    parameter, scaled = (
+        effect.amplitudes[0],
+        name in ("shear_strength", "tensile_strength", "projectile_mass"),
+    )
+    value = (1.0 + abs(size)) ** math.copysign(1.0, size) if scaled else parameter.null + size
+    if name == "strength_rate":
+        value = abs(size)
+    if not LIKELY < float(parameter.prior.cdf(value)) < 1.0 - LIKELY:
+        return None
     if name == "strength_rate":
         n = float(np.clip(rng.normal(0.5, 0.15), 0.1, 1.0))
-        eta = abs(size) * 1000.0 ** (0.5 - n)
+        eta = value * 1000.0 ** (0.5 - n)
         return ({"dust": {"eta": eta, "rate_n": n}}, eta) if eta <= 1.0 else None
-    if name in ("shear_strength", "tensile_strength", "projectile_mass"):
-        factor = (1.0 + abs(size)) ** math.copysign(1.0, size)
-        if not max(WEAKEST, parameter.limits[0]) <= factor <= parameter.limits[1]:
-            return None
-        key = {"shear_strength": "shear_factor", "tensile_strength": "tensile_factor"}.get(name)
-        return ({"dust": {key: factor}} if key else {"measure": {"mass": factor}}), factor - 1.0
-    value = parameter.null + size
-    if not parameter.limits[0] <= value <= parameter.limits[1]:
+    if not parameter.limits[0] <= value <= parameter.limits[1] or (scaled and value < WEAKEST):
         return None
+    if scaled:
+        key = {"shear_strength": "shear_factor", "tensile_strength": "tensile_factor"}.get(name)
+        return ({"dust": {key: value}} if key else {"measure": {"mass": value}}), value - 1.0
     keys: dict | None = None
     if name == "pore_gas":
         keys = {"dust": {"gas_pressure": value}}
