@@ -135,7 +135,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
     nuisances, log_p_m = fit.nuisances, fit.log_p_m
     values = dict.fromkeys(names, 0.0)
     for rounds in range(ROUNDS + 1):
-        bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range))
+        bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range, bench.node_step))
         blocks = linearise_at(free, nuisances, log_p_m, {**fit.values, **values})
         gram, log_determinant, points = gather(blocks, names, scales, values)
         drops = np.stack([blocks[0].tangents[name] * scales[name] for name in names], axis=1)

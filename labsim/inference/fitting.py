@@ -179,8 +179,8 @@ def _ask(
     coarse: bool,
     around: bool,
 ) -> None:
-    bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range))
-    indices: list[float] = [screening_node(log_p_m)] if coarse else [*nearest_nodes(log_p_m)]
+    bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range, bench.node_step))
+    indices: list[float] = [screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, bench.node_step)
     if around:
         indices = nodes_around(log_p_m)
         bench.require_base(indices)

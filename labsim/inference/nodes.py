@@ -13,24 +13,27 @@ def place_strength(log_p_m: float) -> float:
     return (log_p_m - math.log(STRENGTH_ANCHOR)) / math.log(STRENGTH_RATIO)
 
 
-def enclosing_nodes(log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.inf)) -> list[int]:
-    """The four strength nodes about a value; none beyond those that enclose the range (Pa), where soft dust costs most."""
-    below = math.floor(place_strength(log_p_m))
+def enclosing_nodes(
+    log_p_m: float, p_m_range: tuple[float, float] = (0.0, math.inf), step: float = 1.0
+) -> list[float]:
+    """The four strength nodes about a value, ``step`` apart; none beyond those that enclose the range (Pa), where soft dust costs
+    most."""
+    below = math.floor(place_strength(log_p_m) / step)
     low, high = p_m_range
     if math.isfinite(high):
-        below = min(below, math.ceil(place_strength(math.log(high))) - 2)
+        below = min(below, math.ceil(place_strength(math.log(high)) / step) - 2)
     if low > 0.0:
-        below = max(below, math.floor(place_strength(math.log(low))) + 1)
-    return [below - 1, below, below + 1, below + 2]
+        below = max(below, math.floor(place_strength(math.log(low)) / step) + 1)
+    return [step * each for each in (below - 1, below, below + 1, below + 2)]
 
 
-def nearest_nodes(log_p_m: float, share: float = 0.3) -> list[int]:
+def nearest_nodes(log_p_m: float, step: float = 1.0, share: float = 0.3) -> list[float]:
     """The nearest strength node, and the next one where the value lies well between two."""
-    place = place_strength(log_p_m)
+    place = place_strength(log_p_m) / step
     near = round(place)
     if abs(place - near) <= share:
-        return [near]
-    return [math.floor(place), math.ceil(place)]
+        return [step * near]
+    return [step * math.floor(place), step * math.ceil(place)]
 
 
 def nodes_around(log_p_m: float) -> list[float]:

@@ -82,6 +82,12 @@ class Workbench:
         return any(family.felt for family in self.families)
 
     @property
+    def node_step(self) -> float:
+        """Between the strengths at which runs are made, in nodes of the grid. A depth is smooth in ln p_m; the force that an
+        accelerometer feels is off by 1 to 2 % of its largest between nodes a factor of two apart."""
+        return 0.5 if self.felt else 1.0
+
+    @property
     def features(self) -> list[RunFeatures]:
         """What all observations take of runs."""
         return [each for observation in self.observations for each in observation.features]
@@ -189,7 +195,7 @@ class Workbench:
 
     def require_about(self, name: str, log_p_m: float) -> None:
         """The base about a strength and a fingerprint of one effect there."""
-        self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range))
+        self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step))
         index = screening_node(log_p_m)
         wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self.effects[name], 0.0)]
         self.require_changes(wanted, f"{name} at another p_m", coarse=True)
