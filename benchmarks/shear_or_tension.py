@@ -71,9 +71,8 @@ def main() -> None:
             for k, each in enumerate(found):
                 right[k] += each[true] > each[other]
     share = [f"{100 * n / len(names):.0f} %" for n in right]
-    print(
-        f"\nthe true one before the other: with the test {right[0]} of {len(names)} ({share[0]}), drops alone {right[1]} ({share[1]})"
-    )
+    print(f"\nthe true one before the other, of {len(names)}:")
+    print(f"with the test {right[0]} ({share[0]}), drops alone {right[1]} ({share[1]})")
 
 
 if __name__ == "__main__":

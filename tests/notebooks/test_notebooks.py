@@ -16,7 +16,7 @@ from nbclient import NotebookClient
 FOLDER = Path(__file__).parents[2] / "notebooks"
 GALLERY = {  # which of its pictures stands for a notebook in docs/gallery.md; LABSIM_REWRITE_DOCS=1 draws them anew
     "track_projectile": 1, "density_contour": 1, "calibrate_p_m": 1, "find_the_cause": 0, "real_soundings": 1,
-    "seed_experiment": 0,
+    "seed_experiment": 0, "acceleration_records": 0, "static_tests": 0,
 }  # fmt: skip
 LONGEST = 900  # s for one cell on a loaded machine
 # name -> (pictures, what the printed text must hold)
@@ -44,6 +44,22 @@ NOTEBOOKS = {
             r"nominal: rms [45]",
             r"with the cause: rms [12]\.",
             r": none, 0\.[5-9]",
+        ],
+    ),
+    "acceleration_records": (
+        3,
+        [
+            r"D05: 0\.428 m/s at contact, 1\.2\d\d ± 0\.01\d mm deep",
+            r"p_m = 1[6-9]\d\d ± \d+ Pa; p-value of the model 0\.\d",
+            r"p_m = 1[1-6]\d\d ± \d+ Pa \(true 1390\)",
+            r"grows by \d+\.\d ± \d\.\d per metre",
+        ],
+    ),
+    "static_tests": (
+        1,
+        [
+            r"compression_omnidirectional, p-value 0\.\d+\n +p_m = 1[23]\.\d+ ± 0\.\d+ kPa\n +phi_1 = 0\.12",
+            r"p_m at rest 1[23]\.\d+ ± 0\.\d+ kPa \(published 13\), (9|10)\.\d times",
         ],
     ),
     "find_the_cause": (3, [r"verdict: effect", r"pixel_scale +(1|0\.9\d*)\n"]),
