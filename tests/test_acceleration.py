@@ -49,6 +49,17 @@ def test_depth_speed_contact_and_stop_of_a_known_motion(tmp_path: Path) -> None:
     assert not impact.warnings
 
 
+@pytest.mark.parametrize("rate", [2e3, 4e3, 8e3, 20e3, 50e3])
+def test_depth_and_stop_have_the_error_that_the_rate_leaves(tmp_path: Path, rate: float) -> None:
+    depth, stop = move(SHAPE[0] * 1e-3, SHAPE[1] * 1e-6, SHAPE[2], 1300.0)
+    pulls = []
+    for seed in range(5):
+        impact = look(read_campaign(make(tmp_path / str(seed), rate=rate, seed=seed)))
+        pulls.append((impact.penetration_depth.value - depth) / impact.penetration_depth.sigma)
+        assert impact.stopping_time == pytest.approx(stop, abs=0.02 * stop + 0.5 / rate)
+    assert np.max(np.abs(pulls)) < 3
+
+
 def test_a_rebound_has_its_speed_and_none_is_none(tmp_path: Path) -> None:
     plain = look(read_campaign(make(tmp_path / "none")))
     assert abs(plain.rebound_speed.value) < 3 * plain.rebound_speed.sigma

@@ -31,6 +31,7 @@ ZERO = 4.0  # the same of a zero that is off
 LOST = 1.5  # sampling intervals: a longer one is a gap
 FLIGHT = 5  # samples of rest and of flight that a release takes
 RELEASE = 10.0  # ln of the odds
+BENT = 0.05  # of the rise to half the largest reading: what a line through it misses contact by, for the force of a tip bends
 REST = 0.5  # of gravity: a level that is further off is no offset but another unit, sign or rest
 
 
@@ -295,8 +296,12 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     floor = max(SEEN * float(record.sigma[first]) + zero_sigma, 0.02 * float(felt.max()))
     quiet = np.nonzero(felt[: first + 1] - zero < floor)[0]
     first = int(quiet[-1]) + 1 if quiet.size else first
-    contact = _refine(record, first, zero, floor)
-    first = int(np.searchsorted(time, contact))
+    contact, contact_sigma = _refine(record, first, zero, floor)
+    # a sample is the mean over its interval: what it takes up is exact at the edges, wherever in it contact lies
+    edges = np.concatenate(
+        [[time[0] - 0.5 * record.step], 0.5 * (time[1:] + time[:-1]), [time[-1] + 0.5 * record.step]]
+    )
+    first = max(int(np.searchsorted(edges, contact)) - 1, 0)
     warnings = []
     if record.saturated:
         warnings.append(f"{record.saturated} samples lie beyond the range of every sensor and are left out")
@@ -320,9 +325,9 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
             fallen,
             STANDARD_GRAVITY * math.hypot(release_sigma, 2 * record.step, 0.2 * (time[peak] - contact)),
         )
-    net = np.append(-STANDARD_GRAVITY, felt[first:] - zero - STANDARD_GRAVITY)
-    clock = np.append(0.0, time[first:] - contact)
-    given_up = np.concatenate([[0.0], np.cumsum(0.5 * (net[1:] + net[:-1]) * np.diff(clock))])
+    clock = np.append(0.0, edges[first + 1 :] - contact)
+    taken = np.append(0.0, np.cumsum((felt[first:] - zero) * np.diff(edges[first:])))
+    given_up = taken - STANDARD_GRAVITY * clock
     speed, source = _choose_speed(drop, flight_speed, given_up)
     sensors = accelerometer.sensors
     scale = max(each.scale_sigma for each in sensors)
@@ -331,10 +336,22 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     doubt = np.sqrt(
         speed.sigma**2 + (scale * given_up) ** 2 + (zero_sigma * clock) ** 2 + (0.02 * speed.value) ** 2
     )
-    gone = np.append(felt[first:], felt[-1]) < 0.5 * np.maximum.accumulate(np.append(felt[first:], felt[-1]))
+    highest = np.maximum.accumulate(felt[first:])
+    gone = np.append(felt[first:] < 0.5 * highest, False)
     stopped = np.nonzero((velocity <= 0.0) | (gone & (velocity < 3 * doubt)))[0]
     last = int(stopped[0]) if stopped.size else clock.size - 1
-    stop = float(clock[last]) if stopped.size else math.nan
+    stop = math.nan
+    if stopped.size and velocity[last] <= 0.0:
+        last = max(last, 1)
+        before, after = velocity[last - 1], velocity[last]
+        stop = float(clock[last - 1] + (clock[last] - clock[last - 1]) * before / max(before - after, 1e-12))
+    elif stopped.size:  # within the sample in which the force breaks off
+        share = float(np.clip(felt[first + last] / highest[last], 0.0, 1.0))
+        last += 1
+        stop = float(clock[last - 1] + share * (clock[last] - clock[last - 1]))
+    if stopped.size:
+        later, moving = clock[last:].copy(), velocity[last:].copy()
+        clock[last], velocity[last] = stop, max(float(velocity[last]), 0.0)
     depth = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(clock))])
 
     def twice(rate: FloatArray) -> FloatArray:
@@ -342,15 +359,15 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
 
     fall = twice(given_up + STANDARD_GRAVITY * clock)
     depth_sigma = np.sqrt(
-        (speed.sigma * clock) ** 2 + (0.5 * zero_sigma * clock**2) ** 2 + (scale * fall) ** 2
+        (speed.sigma * clock) ** 2 + (speed.value * contact_sigma) ** 2 + (0.5 * zero_sigma * clock**2) ** 2 + (scale * fall) ** 2
         + (record.sigma[min(first, felt.size - 1)] ** 2 * record.step * np.maximum(clock, 0.0) ** 3 / 3)
     )  # fmt: skip
     rest = rebound = Measured(math.nan, math.nan)
-    if stopped.size and clock[-1] >= 2.0 * stop:
-        at = last + int(np.argmin(velocity[last : int(np.searchsorted(clock, 2.0 * stop))]))
-        rebound = Measured(float(-velocity[at]), float(doubt[at]))
+    if stopped.size and later[-1] >= 2.0 * stop:
+        at = int(np.argmin(moving[later <= 2.0 * stop]))
+        rebound = Measured(float(-moving[at]), float(doubt[last + at]))
     if stopped.size:
-        after = felt[first:][clock[1:] > 2.0 * stop]
+        after = felt[time - contact > 2.0 * stop]
         if after.size >= 10:
             rest = Measured(float(np.median(after)), float(1.25 * np.std(after) / math.sqrt(after.size)))
             off = rest.value - STANDARD_GRAVITY
@@ -387,12 +404,27 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     )  # fmt: skip
 
 
-def _refine(record: Acceleration, first: int, zero: float, floor: float) -> float:
-    """Contact (s): the rise from the first sample above the noise to twice that, drawn back to the zero (m/s²)."""
-    later = record.felt[first:] - zero > 2 * floor
-    at = first + int(np.argmax(later)) if later.any() else first
-    begin = float(record.time[first] - 0.5 * record.step)
-    return max(begin - float(record.time[at] - record.time[first]), float(record.time[0]))
+def _refine(record: Acceleration, first: int, zero: float, floor: float) -> tuple[float, float]:
+    """Contact (s) and its error: where the line through the rise, up to half the largest reading, meets the zero (m/s²).
+
+    Contact lies in the first sample above the noise, or in the one before it where the rise is lost in the noise.
+    """
+    time, felt, step = record.time, record.felt - zero, record.step
+    peak = first + int(np.argmax(felt[first:]))
+    rising = first + np.nonzero((felt[first:peak] > floor) & (felt[first:peak] < 0.5 * felt[peak]))[0]
+    if rising.size < 2:  # a blunt tip, or a slow sensor
+        rising = np.array([first, min(first + 1, peak)])
+    slope = 0.0
+    if rising[-1] > rising[0]:
+        slope, height = np.polyfit(time[rising] - time[first], felt[rising], 1)
+    begin = float(time[first] - 0.5 * step)
+    if slope <= 0.0:
+        return max(begin, float(time[0])), 0.5 * step
+    contact = max(
+        float(np.clip(time[first] - height / slope, begin - floor / slope, begin + step)), float(time[0])
+    )
+    noise = float(record.sigma[first]) / slope / math.sqrt(rising.size)
+    return contact, math.hypot(0.25 * step, noise, BENT * (float(time[rising[-1]]) - contact))
 
 
 def _find_release(record: Acceleration, first: int) -> tuple[float, float, Measured]:
