@@ -41,7 +41,7 @@ EFFECTS = {
 }
 # spacings, cells in a tip radius; the first of the mesh is the reference
 OWN, MESH = (8.0, 11.0, 16.0), (16.0, 12.0)
-CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f185"  # for the limits of effects
+CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f161"  # for the limits of effects
 
 
 def lay_out(cells: float, name: str, amplitude: float, speed: float) -> DropSetting:

@@ -56,7 +56,8 @@ def test_depth_and_stop_have_the_error_that_the_rate_leaves(tmp_path: Path, rate
     for seed in range(5):
         impact = look(read_campaign(make(tmp_path / str(seed), rate=rate, seed=seed)))
         pulls.append((impact.penetration_depth.value - depth) / impact.penetration_depth.sigma)
-        assert impact.stopping_time == pytest.approx(stop, abs=0.02 * stop + 0.5 / rate)
+        # what is felt jumps to 1 g at contact, a thirtieth of the largest: a line through the rise begins earlier
+        assert impact.stopping_time == pytest.approx(stop, abs=0.03 * stop + 0.5 / rate)
     assert np.max(np.abs(pulls)) < 3
 
 

@@ -17,9 +17,9 @@ def test_check_says_what_the_page_shows(
 ) -> None:
     monkeypatch.chdir(ROOT)
     with pytest.raises(SystemExit) as left:
-        main(["check", "data/campaigns/f185"])
+        main(["check", "data/campaigns/f161"])
     assert left.value.code == 0
-    shown = PAGE.split("labsim check data/campaigns/f185\n```")[1].split("\nThe depths")[0]
+    shown = PAGE.split("labsim check data/campaigns/f161\n```")[1].split("\nThe depths")[0]
     assert [line.strip() for line in capsys.readouterr().out.splitlines() if line.strip()] == [
         line.strip() for line in shown.splitlines() if line.strip()
     ]
