@@ -14,7 +14,7 @@ from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode
 from labsim.inference.evidence import log_share_inside
 from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
-from labsim.inference.nodes import enclosing_nodes
+from labsim.inference.nodes import enclosing_nodes, nearest_nodes
 from labsim.inference.observations.compacted_zone import Block
 from labsim.inference.observe import observe_drop
 from labsim.inference.posterior import measure_residual, sample
@@ -257,3 +257,7 @@ def test_no_base_is_simulated_beyond_the_range_of_p_m():
     assert enclosing_nodes(math.log(150.0), limits) == [-2, -1, 0, 1]
     assert enclosing_nodes(math.log(9000.0), limits) == [0, 1, 2, 3]
     assert enclosing_nodes(math.log(150.0)) == [-4, -3, -2, -1]
+    # accelerometers: half as far apart
+    assert enclosing_nodes(math.log(1300.0), limits, 0.5) == [-0.5, 0.0, 0.5, 1.0]
+    assert nearest_nodes(math.log(1300.0), 0.5) == [0.5]
+    assert nearest_nodes(math.log(1200.0), 0.5) == [0.0, 0.5]
