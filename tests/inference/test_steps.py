@@ -30,6 +30,7 @@ def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
     return SimpleNamespace(
         campaign=SimpleNamespace(p_m_range=RANGE),
         felt=False,
+        node_step=1.0,
         effects={"effect": SimpleNamespace(amplitudes=[parameter])},
         observations=[SimpleNamespace(begin=lambda: np.empty(0), follow=lambda own, block, left: (own, 0.0))],
         shape_evidence={},
