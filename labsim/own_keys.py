@@ -83,15 +83,9 @@ def read_law(table: Table, beside: Path | None = None) -> tuple[Material, str, t
 
 def read_range(table: Table, key: str, least: float, most: float) -> tuple[float, float]:
     """Two numbers between which a strength is looked for, in the key's unit."""
-    found = table.get(key)
-    if not isinstance(found, list) or len(found) != 2:
-        raise table.wrong(key, f"{found!r} is not a range; write two pressures in Pa as [300.0, 6000.0]")
-    for value in found:
-        table.check_number(key, value, least, most)
-    low, high = map(float, found)
-    if high <= low:
-        raise table.wrong(key, f"{found} does not grow; write the smaller pressure first")
-    return low, high
+    return table.span(
+        key, least, most, write="two pressures in Pa as [300.0, 6000.0]", first="smaller pressure"
+    )
 
 
 def set_law(material: Material, table: Table) -> Material:

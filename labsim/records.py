@@ -21,6 +21,7 @@ FloatArray = npt.NDArray[np.floating[Any]]
 STANDARD_GRAVITY = (
     9.81  # m/s^2, of every free fall, and of the nominal model where a campaign says nothing else
 )
+ALWAYS = (-math.inf, math.inf)  # s: the window of a record without one
 
 
 class Summarised:
@@ -149,7 +150,7 @@ class Accelerometer:
     sensors: tuple[Sensor, ...]
     unit: float
     reads_at_rest: float
-    window: tuple[float, float] = (-math.inf, math.inf)
+    window: tuple[float, float] = ALWAYS
 
 
 @dataclass(frozen=True)

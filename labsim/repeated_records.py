@@ -6,17 +6,14 @@ Noise never repeats, so that rows which agree to the last digit, or files which 
 from __future__ import annotations
 
 import filecmp
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from .errors import CampaignError, MeasurementError
-from .records import Drop, Scan, StrengthTest
+from .records import ALWAYS, Drop, Scan, StrengthTest
 from .tracks import read_rows
-
-ALL = (-math.inf, math.inf)  # s: a record without a window
 
 
 def refuse_repeated_records(
@@ -36,7 +33,7 @@ def refuse_repeated_records(
             (tracks if drop.record.kind == "track" else videos).append((toml, drop.record.path, drop))
     _compare_rows(tracks)
     _compare_files([(toml, path, _find_window(drop)) for toml, path, drop in videos], "record.file")
-    slices = [(campaign / "ct" / scan.name / "scan.toml", scan.slices, ALL) for scan in scans]
+    slices = [(campaign / "ct" / scan.name / "scan.toml", scan.slices, ALWAYS) for scan in scans]
     _compare_files(slices, "scan.slices")
     seen: dict[tuple[tuple[float, float], ...], str] = {}
     for test in tests:
@@ -60,7 +57,7 @@ def _compare_rows(tracks: Sequence[tuple[Path, Path, Drop]]) -> None:
 
 
 def _find_window(drop: Drop) -> tuple[float, float]:
-    return ALL if drop.accelerometer is None else drop.accelerometer.window
+    return ALWAYS if drop.accelerometer is None else drop.accelerometer.window
 
 
 def _compare_files(records: Sequence[tuple[Path, Path, tuple[float, float]]], key: str) -> None:

@@ -145,6 +145,18 @@ class Table:
             self.check_number(key, each, low, high, whole=whole)
         return tuple(int(each) if whole else float(each) for each in value)
 
+    def span(self, key: str, low: float, high: float, *, write: str, first: str) -> tuple[float, float]:
+        """Two numbers between low and high, the smaller one first. write, first : for people, as "two depths as [5.0, 40.0]" and
+        "shallower depth"."""
+        value = self.get(key)
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.wrong(key, f"{value!r} is not a range; write {write}")
+        for each in value:
+            self.check_number(key, each, low, high)
+        if not value[0] < value[1]:
+            raise self.wrong(key, f"{value} does not grow; write the {first} first")
+        return float(value[0]), float(value[1])
+
     def text(self, key: str, default: Any = _REQUIRED) -> Any:
         value = self.get(key, default)
         if key in self.values and (

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import CampaignError, MeasurementError
 from ..extensions import list_modules
-from ..records import STANDARD_GRAVITY, Accelerometer, Drop, FloatArray, Measured, Sensor
+from ..records import ALWAYS, STANDARD_GRAVITY, Accelerometer, Drop, FloatArray, Measured, Sensor
 from ..tables import Table
 
 UNITS = {"g": STANDARD_GRAVITY, "m/s^2": 1.0}
@@ -65,7 +65,8 @@ class Impact:
 
     contact_time, released : s on the record's clock, released is NaN where no release is seen; flight, rest : m/s², felt in
     free flight and after the stop (NaN where the record has none), should be 0 and gravity; flight_speed : m/s, from the time
-    between release and contact. time (s, from contact), speed (m/s), depth, depth_sigma (m) : (n,).
+    between release and contact; rebound_speed : m/s, upwards, the largest up to twice the stopping time, NaN where the record
+    ends before. time (s, from contact), speed (m/s), depth, depth_sigma (m) : (n,).
     """
 
     contact_time: float
@@ -81,9 +82,7 @@ class Impact:
     depth_sigma: FloatArray
     stopping_time: float  # s, NaN where the record ends before
     penetration_depth: Measured
-    rebound_speed: (
-        Measured  # m/s, upwards, the largest up to twice the stopping time; NaN where the record ends before
-    )
+    rebound_speed: Measured
     warnings: tuple[str, ...]
 
 
@@ -124,16 +123,9 @@ def read_accelerometer(table: Table) -> Accelerometer:
 
 def _read_window(table: Table) -> tuple[float, float]:
     """The seconds on the record's clock that are this drop's; all where none are stated."""
-    window = table.get("window_s", None)
-    if window is None:
-        return -math.inf, math.inf
-    if not isinstance(window, list) or len(window) != 2:
-        raise table.wrong("window_s", f"{window!r} is not a range; write two times as [12.3, 12.8]")
-    for value in window:
-        table.check_number("window_s", value, -LARGEST, LARGEST)
-    if not window[0] < window[1]:
-        raise table.wrong("window_s", f"{window} does not grow; write the earlier time first")
-    return float(window[0]), float(window[1])
+    if not table.has("window_s"):
+        return ALWAYS
+    return table.span("window_s", -LARGEST, LARGEST, write="two times as [12.3, 12.8]", first="earlier time")
 
 
 def _each(
@@ -357,7 +349,7 @@ def find_impact(record: Acceleration, drop: Drop) -> Impact:
     def twice(rate: FloatArray) -> FloatArray:
         return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(clock))])
 
-    fall = twice(given_up + STANDARD_GRAVITY * clock)
+    fall = twice(taken)
     depth_sigma = np.sqrt(
         (speed.sigma * clock) ** 2 + (speed.value * contact_sigma) ** 2 + (0.5 * zero_sigma * clock**2) ** 2 + (scale * fall) ** 2
         + (record.sigma[min(first, felt.size - 1)] ** 2 * record.step * np.maximum(clock, 0.0) ** 3 / 3)

@@ -20,7 +20,7 @@ from scipy.stats import truncnorm
 from ..inference.blocks import Block, solve_globals
 from ..inference.evidence import log_share_inside
 from ..inference.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
-from ..inference.nodes import amplitude_nodes, enclosing_nodes, place_strength
+from ..inference.nodes import amplitude_nodes, place_strength
 from ..inference.run_parts import Push
 from ..inference.steps import move_nuisances
 from ..inference.tangents import linearise_at
@@ -135,7 +135,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
     nuisances, log_p_m = fit.nuisances, fit.log_p_m
     values = dict.fromkeys(names, 0.0)
     for rounds in range(ROUNDS + 1):
-        bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range, bench.node_step))
+        bench.require_base_about(log_p_m)
         blocks = linearise_at(free, nuisances, log_p_m, {**fit.values, **values})
         gram, log_determinant, points = gather(blocks, names, scales, values)
         drops = np.stack([blocks[0].tangents[name] * scales[name] for name in names], axis=1)

@@ -80,14 +80,9 @@ def read_gauge(table: Table) -> Gauge:
     forces, pressures = table.has("force_column"), table.has("pressure_column")
     if forces and pressures:
         raise table.wrong("force_column", "and pressure_column are both there; keep the one that is meant")
-    window = table.get("window_mm", None)
-    if window is not None:
-        if not isinstance(window, list) or len(window) != 2:
-            raise table.wrong("window_mm", f"{window!r} is not a range; write two depths as [5.0, 40.0]")
-        for value in window:
-            table.check_number("window_mm", value, 0.0, 1e5)
-        if not window[0] < window[1]:
-            raise table.wrong("window_mm", f"{window} does not grow; write the shallower depth first")
+    window = None
+    if table.has("window_mm"):
+        window = table.span("window_mm", 0.0, 1e5, write="two depths as [5.0, 40.0]", first="shallower depth")
     units = FORCE_UNITS if forces else PRESSURE_UNITS
     if forces or pressures:
         name = table.choice("force_unit", tuple(units))

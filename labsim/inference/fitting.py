@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from ..records import FloatArray
 from .blocks import Block
 from .evidence import integrate_by_laplace
-from .nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, nodes_around, screening_node
+from .nodes import amplitude_nodes, nearest_nodes, nodes_around, screening_node
 from .observations.tracks import DropsBlock
 from .steps import (
     LOWER,
@@ -180,7 +180,7 @@ def _ask(
     coarse: bool,
     around: bool,
 ) -> None:
-    bench.require_base(enclosing_nodes(log_p_m, bench.campaign.p_m_range, bench.node_step))
+    bench.require_base_about(log_p_m)
     indices: list[float] = [screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, bench.node_step)
     if around:
         indices = nodes_around(log_p_m)

@@ -179,6 +179,9 @@ class Workbench:
             for index in indices:
                 self._fill_base(number, index)
 
+    def require_base_about(self, log_p_m: float) -> None:
+        self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step))
+
     def require_changes(
         self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, coarse: bool = False
     ) -> None:
@@ -195,7 +198,7 @@ class Workbench:
 
     def require_about(self, name: str, log_p_m: float) -> None:
         """The base about a strength and a fingerprint of one effect there."""
-        self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step))
+        self.require_base_about(log_p_m)
         index = screening_node(log_p_m)
         wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self.effects[name], 0.0)]
         self.require_changes(wanted, f"{name} at another p_m", coarse=True)

@@ -35,7 +35,7 @@ def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
         observations=[SimpleNamespace(begin=lambda: np.empty(0), follow=lambda own, block, left: (own, 0.0))],
         shape_evidence={},
         costs_runs=lambda name: False,
-        require_base=lambda nodes: None,
+        require_base_about=lambda log_p_m: None,
         seen=seen,
     )
 

@@ -51,6 +51,7 @@ class AccelerationModel:
     blunt: bool  # the tip has a face
     camera: None = None
     unit: str = "m/s^2"
+    change_counts: bool = False  # two codes' forces differ as much in small changes as in large
 
     @property
     def radius(self) -> float:

@@ -165,12 +165,12 @@ def linearise_drop(
     if with_others:
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
-    # another code's force differs by as much where an effect changes half of it as where it changes a thirtieth
-    felt = isinstance(model, AccelerationModel)
     off, length, changes = model.find_solver_error(here, clock, final, instrument, terms.numerical)
-    plain = here if code is response.plain else model.predict(response.plain, instrument, instant)
+    change: FloatArray | float = 0.0
+    if model.change_counts and code is not response.plain:
+        change = here - model.predict(response.plain, instrument, instant)
     numerical = NumericalError(
-        off if felt else np.hypot(off, (here - plain) * terms.numerical_change),
+        np.hypot(off, change * terms.numerical_change),
         np.clip(clock / stop, 0.0, 1.0),
         reach,
         math.log(model.radius),

@@ -44,6 +44,7 @@ class PushModel:
     first: int
     camera: None = None
     unit: str = "1"
+    change_counts: bool = True
     surface_sigma: float = 1.0
 
     @property
