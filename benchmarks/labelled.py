@@ -11,14 +11,16 @@ import os
 import shutil
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
+Found = TypeVar("Found")
 SMALL = 0.5e-3  # m, the radius that forces on the side of a rod are stated for
 SCATTER = 0.02  # of p_m from sample to sample, where the plan says no other
 # the words of the labelled campaigns' truth.json
@@ -156,3 +158,22 @@ def make_campaigns(
             print(
                 f"{name}: {found['cause']} ({found['note']}), {time.perf_counter() - began:.0f} s", flush=True
             )
+
+
+def measure_campaigns(
+    measure: Callable[[Path], Found], description: str | None
+) -> Iterator[tuple[str, dict, Found]]:
+    """The command of a study: name, truth and what is found of every campaign that is named, in their order. measure : of a
+    campaign's folder."""
+    parser = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("names", help="g01,g02 …")
+    parser.add_argument("--workers", type=int, default=2)
+    asked = parser.parse_args()
+    names = asked.names.split(",")
+    truth = json.loads((asked.folder / "truth.json").read_text())
+    with ProcessPoolExecutor(asked.workers, mp_context=get_context("spawn")) as pool:
+        found = pool.map(measure, [asked.folder / name for name in names])
+        yield from zip(names, [truth[name] for name in names], found, strict=True)

@@ -9,12 +9,11 @@ one over that of the other, and over that of nothing hidden.
 
 from __future__ import annotations
 
-import argparse
-import json
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
+from labelled import measure_campaigns
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
@@ -46,33 +45,19 @@ def measure(folder: Path) -> tuple[dict[str, float], dict[str, float]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("names")
-    parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
-    names = asked.names.split(",")
-    truth = json.loads((asked.folder / "truth.json").read_text())
     print(
         "| campaign | hidden | drops and test: over the other, over none | drops alone |\n|---|---|---|---|"
     )
-    right = [0, 0]
-    with ProcessPoolExecutor(asked.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        for name, found in zip(
-            names, pool.map(measure, [asked.folder / name for name in names]), strict=True
-        ):
-            true = truth[name]["cause"]
-            (other,) = set(CAUSES) - {true}
-            (factor,) = truth[name]["mat"].values()
-            cells = [f"{each[true] - each[other]:+.1f}, {each[true]:+.1f}" for each in found]
-            print(f"| {name} | {true} × {factor:.2f} | {cells[0]} | {cells[1]} |", flush=True)
-            for k, each in enumerate(found):
-                right[k] += each[true] > each[other]
-    share = [f"{100 * n / len(names):.0f} %" for n in right]
-    print(f"\nthe true one before the other, of {len(names)}:")
-    print(f"with the test {right[0]} ({share[0]}), drops alone {right[1]} ({share[1]})")
+    right = []
+    for name, truth, found in measure_campaigns(measure, __doc__):
+        true = truth["cause"]
+        (other,) = set(CAUSES) - {true}
+        (factor,) = truth["mat"].values()
+        cells = [f"{each[true] - each[other]:+.1f}, {each[true]:+.1f}" for each in found]
+        print(f"| {name} | {true} × {factor:.2f} | {cells[0]} | {cells[1]} |", flush=True)
+        right.append([each[true] > each[other] for each in found])
+    tested, alone = np.sum(right, axis=0)
+    print(f"\nthe true one before the other, of {len(right)}: with the test {tested}, drops alone {alone}")
 
 
 if __name__ == "__main__":

@@ -9,14 +9,12 @@ is hidden too, all by ``labsim.calibrate``. Printed are medians and the truth, a
 
 from __future__ import annotations
 
-import argparse
 import json
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from labelled import measure_campaigns
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import calibrate
@@ -38,8 +36,10 @@ class Found:
     p_m: tuple[float, float, float]
 
 
-def measure(folder: Path, causes: tuple[str, ...]) -> Found:
+def measure(folder: Path) -> Found:
     campaign = read_campaign(folder)
+    # the causes are stated to the calibration, their sizes are not
+    causes = json.loads((folder.parent / "truth.json").read_text())[folder.name]["cause"].split(" + ")
     tests = [test for test in campaign.strength_tests if test.kind == KIND]
     curve = fit_strength(KIND, tests, set_terms(campaign).scatter)
     found = calibrate(campaign, ("p_m", *causes), workers=1).posterior
@@ -53,39 +53,32 @@ def measure(folder: Path, causes: tuple[str, ...]) -> Found:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("names")
-    parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
-    names = asked.names.split(",")
-    # the causes are stated to the calibration; their sizes stay in truth.json until all is found
-    truth = json.loads((asked.folder / "truth.json").read_text())
-    causes = [tuple(truth[name]["cause"].split(" + ")) for name in names]
     print(
         "| campaign | Δ true, alone, beside | φ2 true, alone, beside | p_m true, found (kPa) |\n|---|---|---|---|"
     )
-    counts = {key: 0 for key in ("Δ alone", "φ2 alone", "Δ beside", "φ2 beside", "p_m in its 90 % interval")}
-    with ProcessPoolExecutor(asked.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        results = pool.map(measure, [asked.folder / name for name in names], causes)
-        for name, found in zip(names, results, strict=True):
-            true = NOMINAL | {key: v for key, v in truth[name]["mat"].items() if key in NOMINAL}
-            cells = [f"{true[k]:.3f}, {found.alone[k]:.3f}, {found.beside[k]:.3f}" for k in NOMINAL]
-            low, middle, high = (p / 1e3 for p in found.p_m)
-            p_m = truth[name]["pm"] / 1e3
-            print(
-                f"| {name} | {' | '.join(cells)} | {p_m:.2f}, {middle:.2f} ({low:.2f} to {high:.2f}) |",
-                flush=True,
-            )
-            for key, sign in (("delta", "Δ"), ("phi_2", "φ2")):
-                for way, values in (("alone", found.alone), ("beside", found.beside)):
-                    counts[f"{sign} {way}"] += abs(values[key] / true[key] - 1.0) < CLOSE
-            counts["p_m in its 90 % interval"] += low < p_m < high
+    close, inside = [], []
+    for name, truth, found in measure_campaigns(measure, __doc__):
+        true = {key: truth["mat"].get(key, NOMINAL[key]) for key in NOMINAL}
+        cells = [f"{true[k]:.3f}, {found.alone[k]:.3f}, {found.beside[k]:.3f}" for k in NOMINAL]
+        low, middle, high = (p / 1e3 for p in found.p_m)
+        p_m = truth["pm"] / 1e3
+        print(
+            f"| {name} | {' | '.join(cells)} | {p_m:.2f}, {middle:.2f} ({low:.2f} to {high:.2f}) |",
+            flush=True,
+        )
+        close.append(
+            [
+                abs(each[key] / true[key] - 1.0) < CLOSE
+                for key in NOMINAL
+                for each in (found.alone, found.beside)
+            ]
+        )
+        inside.append(low < p_m < high)
     print()
-    for what, count in counts.items():
-        print(f"{what}{'' if 'p_m' in what else f' within {100 * CLOSE:g} %'}: {count} of {len(names)}")
+    whats = ("Δ, the test alone", "Δ beside drops", "φ2, the test alone", "φ2 beside drops")
+    for what, count in zip(whats, np.sum(close, axis=0), strict=True):
+        print(f"{what} within {100 * CLOSE:g} %: {count} of {len(close)}")
+    print(f"p_m in its 90 % interval: {sum(inside)} of {len(inside)}")
 
 
 if __name__ == "__main__":

@@ -46,13 +46,12 @@ SOFTEST = -0.027  # of φ in a crust: dust has no strength at φ1
 
 def hide(name: str, effect: Effect, size: float, rng: np.random.Generator) -> tuple[dict, float] | None:
     """Keys of a campaign in a plan, and the effect's amplitude; None where a cause of this size (its sign counts) is none."""
-    parameter, scaled = (
-        effect.amplitudes[0],
-        name in ("shear_strength", "tensile_strength", "projectile_mass"),
-    )
-    value = (1.0 + abs(size)) ** math.copysign(1.0, size) if scaled else parameter.null + size
-    if name == "strength_rate":
-        value = abs(size)
+    parameter = effect.amplitudes[0]
+    scaled = name in ("shear_strength", "tensile_strength", "projectile_mass")
+    if scaled:
+        value = (1.0 + abs(size)) ** math.copysign(1.0, size)
+    else:
+        value = abs(size) if name == "strength_rate" else parameter.null + size
     if not LIKELY < float(parameter.prior.cdf(value)) < 1.0 - LIKELY:
         return None
     if name == "strength_rate":
