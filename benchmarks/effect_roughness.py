@@ -5,6 +5,8 @@
 Deceleration over fortieths of each run's own stopping time, over its mean: p_m's part is taken off. The table has what an effect
 changes of that, in %, and how far it is off from the mesh of 16 cells (benchmarks/lagrangian_mesh), rms of three drops. What is
 rough alike at every resolution is the mesh's own.
+
+A second table has how alike two effects are: what is left of the one's change, rms %, after the best multiple of the other's.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ EFFECTS = {
     "strength_slope": (0.4, {"delta": 0.98}),
     "density_gradient": (8.0, {"gradient": 8.0}),
     "pore_gas": (8000.0, {"gas_pressure": 8000.0}),
+    "weak tensile_strength": (-0.73, {"tensile_factor": 0.27}),
+    "weak shear_strength": (-0.48, {"shear_factor": 0.52}),
 }
 # spacings, cells in a tip radius; the first of the mesh is the reference
 OWN, MESH = (8.0, 11.0, 16.0), (16.0, 12.0)
@@ -52,7 +56,7 @@ def lay_out(cells: float, name: str, amplitude: float, speed: float) -> DropSett
     if not name:
         return setting
     campaign = read_campaign(CAMPAIGN)
-    effect = list_effects(campaign)[name]
+    effect = list_effects(campaign)[name.removeprefix("weak ")]
     parameter = effect.amplitudes[0]
     place = next(iter(list_places(campaign).values()))
     return effect.apply(setting, {parameter.name: parameter.null + amplitude}, place)
@@ -86,15 +90,22 @@ def main() -> None:
     words = [f"labsim, {cells:g}" for cells in OWN] + [f"mesh, {cells:g}" for cells in MESH[1:]]
     print("| effect | changes, rms % | off from the mesh, rms %: " + " | ".join(words) + " |")
     print("|---" * (2 + len(words)) + "|")
+    references = {}
     for name in EFFECTS:
         changed = {
             kind: 100
             * np.array([found[(*kind, name, speed)] - found[(*kind, "", speed)] for speed in SPEEDS])
             for kind in kinds
         }
-        reference = changed[False, MESH[0]]
+        reference = references[name] = changed[False, MESH[0]]
         off = [float(np.std(changed[kind] - reference)) for kind in kinds if kind != (False, MESH[0])]
         print(f"| {name} | {reference.std():.1f} | " + " | ".join(f"{each:.1f}" for each in off) + " |")
+
+    print("\n| what is left of | " + " | ".join(f"after {name}" for name in EFFECTS) + " |")
+    print("|---" * (1 + len(EFFECTS)) + "|")
+    for name, own in references.items():
+        left = [own - other * np.sum(own * other) / np.sum(other**2) for other in references.values()]
+        print(f"| {name} | " + " | ".join(f"{each.std():.1f}" for each in left) + " |")
 
 
 if __name__ == "__main__":
