@@ -182,8 +182,8 @@ def _read(path: Path, accelerometer: Accelerometer) -> Readings:
         raise MeasurementError(
             path,
             "record.window_s",
-            f"holds {inside.sum()} samples of a record from {found.time.min():g} to {found.time.max():g} s; an impact takes "
-            f"{FEWEST} or more",
+            f"holds {inside.sum()} samples and an impact takes {FEWEST}; choose seconds that the record has, which goes from "
+            f"{found.time.min():g} to {found.time.max():g} s",
         )
     found = Readings(found.time[inside], found.values[inside], found.ranges)
     largest = float(np.nanmax(np.abs(found.values), initial=0.0)) / accelerometer.unit
