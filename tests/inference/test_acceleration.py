@@ -164,6 +164,32 @@ def test_the_likelihood_has_no_jump_as_contact_moves(tmp_path: Path) -> None:
     assert np.abs(np.diff(seen)).max() < 0.5
 
 
+def test_runs_between_nodes_give_no_blow_at_contact(tmp_path: Path) -> None:
+    """An interpolated speed at contact is off by a thousandth; within a stretch that would be a hundredth of the peak."""
+    folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
+    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = bench.tracks.models[0]
+    code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
+    off = np.concatenate([code[:2], 1.001 * code[2:]])
+    seen, beside = (model.predict(each, Instrument(), model.start) for each in (code, off))
+    assert np.abs(beside - seen).max() < 1e-6 * seen.max()
+
+
+def test_errors_of_a_record_do_not_pass_for_its_scale(tmp_path: Path) -> None:
+    """A scale that acted on the data would take a hundredth of their χ² for itself, always upwards, and p_m down with it."""
+    folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
+    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = bench.tracks.models[0]
+    assert isinstance(model, AccelerationModel)
+    code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
+    here = model.predict(code, Instrument(), model.start)
+    rough = here + 0.1 * here.max() * np.random.default_rng(1).normal(size=here.size)
+    for felt in (here, rough):
+        known = replace(model, observed=replace(model.observed, felt=felt))
+        (scale,) = known.share(here, lambda factor: here, (0.0, 0.0, 0.0)).values()
+        assert scale == pytest.approx(0.01 * here, abs=1e-9)
+
+
 @pytest.mark.parametrize("off", [-1.2, -0.5, 0.5, 1.2])
 def test_a_contact_that_is_off_finds_back(off: float, tmp_path: Path) -> None:
     """Stretches too early or too late: the force of a round tip begins at nought, so a slope leads to the same χ² as before."""

@@ -108,7 +108,10 @@ class DropModel:
         return np.full((self.matrix.shape[0], 1), self.surface_sigma)
 
     def share(
-        self, differ: Callable[[str], FloatArray], sizes: tuple[float, float, float]
+        self,
+        here: FloatArray,
+        differ: Callable[[str], FloatArray],
+        sizes: tuple[float, float, float],
     ) -> dict[str, FloatArray]:
         """Errors with one value for several drops; sizes : of pixel size, frame rate and the offset of the contact."""
         camera = f"{self.observed.pixel:.6g} {self.camera.frame_rate:.6g}"

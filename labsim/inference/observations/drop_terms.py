@@ -155,7 +155,7 @@ def linearise_drop(
     reach = float(code[0]) - math.log(model.radius)
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
-        **model.share(differ, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
+        **model.share(here, differ, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
         **model.share_solver(clock, float(stop), reach),
         "numerical slope": model.slope(code, instrument, instant, here)
         * (reach - USUAL_DEPTH)

@@ -111,7 +111,10 @@ class PushModel:
         return np.column_stack([np.zeros(self.data.size), offset / np.exp(self.data)])
 
     def share(
-        self, differ: Callable[[str], FloatArray], sizes: tuple[float, float, float]
+        self,
+        here: FloatArray,
+        differ: Callable[[str], FloatArray],
+        sizes: tuple[float, float, float],
     ) -> dict[str, FloatArray]:
         """Errors with one value for all records: the profile, window by window, and the scale of the gauge."""
         gauge = self.observed.drop.gauge
