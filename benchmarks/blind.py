@@ -29,7 +29,6 @@ from material_points.compare_changes import HIDDEN
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
-from labsim.diagnosis.screen import CONFUSABLE
 from labsim.diagnosis.shapes import MARK
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.runs import RunStore
@@ -43,6 +42,7 @@ WORDS = HIDDEN | {
     "scale": "ct_scale",
 }
 PROFILES = {"crust": ("surface_crust", "df", "l"), "gradient": ("density_gradient", "slope", "")}
+MOST_ALIKE = 3  # causes of a stated class that still counts as an answer
 LEAST_REMOVED = 0.1  # of the mean square, by the truth: where it removes less there is nothing to share
 
 
@@ -67,7 +67,7 @@ def describe(name: str, found: Diagnosis) -> dict:
         "p_m_90": tuple(np.quantile(p_m, [0.05, 0.95])),
         "p_m_nominal": float(np.median(nominal)),
         "gain": found.gain.fraction_removed,
-        "confusable": found.confusable,
+        "alike": found.alike,
         "runs_new": found.runs_new,
         "wall": found.wall,
     }
@@ -119,10 +119,7 @@ def score(rows: list[dict], truth: dict) -> pd.DataFrame:
     for row in rows:
         known = truth[row["campaign"]]
         cause = name_hypothesis(known["cause"].split(" + "))
-        alike = {cause}
-        for first, second, cosine in row["confusable"]:
-            if cause in (first, second) and abs(cosine) > CONFUSABLE:
-                alike |= {first, second}
+        alike = {row["first"], *row["alike"]}  # the stated class
         probabilities = dict(row["ranked"])
         low, high = row["p_m_90"]
         table.append(
@@ -134,9 +131,9 @@ def score(rows: list[dict], truth: dict) -> pd.DataFrame:
                 "P(hidden)": round(probabilities.get(cause, 0.0), 3),
                 "rank": 1 + [h for h, _ in row["ranked"]].index(cause) if cause in probabilities else 0,
                 "exact": row["first"] == cause,
-                "class": row["first"] in alike and len(alike) <= 3,
+                "class": cause in alike and len(alike) <= MOST_ALIKE,
                 "named": cause in row["named"],
-                "wrong>0.5": row["first"] not in alike
+                "wrong>0.5": cause not in alike
                 and row["first"] not in ("none", "unknown")
                 and row["probability"] > 0.5,
                 "Brier": round(sum((p - (h == cause)) ** 2 for h, p in row["ranked"]), 3),

@@ -41,7 +41,16 @@ from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
-from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, judge, weigh_prior
+from .judge import (
+    FELT_TEMPERATURE,
+    PREDICTED,
+    PRIOR_UNKNOWN,
+    TEMPERATURE,
+    Verdict,
+    find_class,
+    judge,
+    weigh_prior,
+)
 from .learned_law import LearnedLaw, learn_law
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, return_to_singles, settle_leading
@@ -78,6 +87,14 @@ class Judgement:
     p_value: float
     predicted: float
     best: Fit
+
+    @property
+    def alike(self) -> list[str]:
+        """The cause named first and those from which these data cannot tell it; none where there are no others."""
+        if self.verdict.word != "effect" or len(self.best.hypothesis) != 1:
+            return []
+        found = find_class(self.best, self.rivals, _choose_temperature(self.bench))
+        return found if len(found) > 1 else []
 
     @property
     def leading(self) -> Fit:
@@ -152,6 +169,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
         list(bench.effects),
         {score.name: score.log_bayes for score in screening.scores},
         predicted,
+        _choose_temperature(bench),
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it
@@ -161,6 +179,10 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
     return Judgement(
         bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, predicted, best
     )
+
+
+def _choose_temperature(bench: Workbench) -> float:
+    return FELT_TEMPERATURE if bench.felt else TEMPERATURE
 
 
 def judge_scatters(

@@ -7,18 +7,23 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..inference.fitting import Fit, Hypothesis
 
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1
 PRIOR_PAIRS = 0.1  # all pairs together
-TEMPERATURE = 3.0  # among causes: what tells one from another rests on details in which two solvers differ
+# among causes: what tells one from another rests on details in which two solvers differ; and where accelerometers are
+TEMPERATURE, FELT_TEMPERATURE = 3.0, 10.0
 # of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
 # most 5.5, the weakest that was 9.6
 NESTED = 2.0
 # p value of the best cause's held-out drops, or of its own data, below which what is not listed gets the odds that it allows
 PREDICTED = 0.05
-NAMED = 0.9  # probability that what a verdict names holds together
+# probability that what a verdict names holds together; and that one of two causes has to get where it is the one, on average, if
+# the data can tell them apart
+NAMED = 0.9
 MOST_NAMED = 3
 
 
@@ -74,12 +79,13 @@ def judge(
     catalogue: Sequence[str],
     screened: Mapping[str, float],
     predicted: float = 1.0,
+    temperature: float = TEMPERATURE,
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
     The best cause or pair counts in full against none and unknown. Among those that explain more than none, the others fall
-    off behind it by the difference of their gains over TEMPERATURE (NESTED where they are part of the best): they are told apart
-    by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
+    off behind it by the difference of their gains over the temperature (NESTED where they are part of the best): they are told
+    apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
 
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
     p value of held-out drops with the best cause, or of its own data. Where they are missed, unknown stands to that cause at
@@ -99,10 +105,10 @@ def judge(
     nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
     for hypothesis, value in gain.items():
         above = max(value, 0.0)
-        tempered = most - (most - above) / (NESTED if set(hypothesis) < ahead else TEMPERATURE)
+        tempered = most - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
         # what explains less than a part of the best never stands before that part
         behind = [
-            most - (most - part) / NESTED - (part - above) / TEMPERATURE for part in nested if part >= above
+            most - (most - part) / NESTED - (part - above) / temperature for part in nested if part >= above
         ]
         tempered = min([tempered, *behind])
         weight[hypothesis] = (
@@ -122,3 +128,26 @@ def judge(
     best = ranked[0][0]
     word = best[0] if best in (("none",), ("unknown",)) else "effect"
     return Verdict(word, ranked)
+
+
+def find_class(first: Fit, rivals: Sequence[Fit], temperature: float = TEMPERATURE) -> list[str]:
+    """The cause that was found and those from which these data cannot tell it, by name; whichever has more evidence.
+
+    Were one of two fits the truth, the other's ln evidence would on average be behind by half the square of their distance: of
+    what they predict, in standard deviations of the data. Over the temperature that has to give it NAMED of the probability.
+    """
+    least = 2.0 * temperature * math.log(NAMED / (1.0 - NAMED))
+    names = {first.hypothesis[0]}
+    for other in rivals:
+        if len(other.hypothesis) == 1 and _distance(first, other) < least:
+            names.add(other.hypothesis[0])
+    return sorted(names)
+
+
+def _distance(one: Fit, other: Fit) -> float:
+    """Squared, of two fits' predictions, in standard deviations of the data as the first sees them."""
+    apart = 0.0
+    for here, there in zip(one.blocks, other.blocks, strict=True):
+        white = here.whiten(here.residual - there.residual)
+        apart += float(np.sum(white**2))
+    return apart

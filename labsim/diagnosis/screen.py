@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.cluster.hierarchy import fcluster, linkage
-from scipy.spatial.distance import squareform
 
 from ..inference.blocks import whiten_all
 from ..inference.evidence import integrate_linear, log_share_inside
@@ -169,20 +167,3 @@ def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:
             if abs(cosine) > CONFUSABLE:
                 found.append((first, screening.names[j], cosine))
     return sorted(found, key=lambda item: -abs(item[2]))
-
-
-def group_classes(confusable: Sequence[tuple[str, str, float]]) -> list[list[str]]:
-    """Causes that no two of which this campaign tells apart, in the order of their names; a cause by itself is no class.
-
-    Complete linkage, so that a chain of neighbours does not make one class of all. confusable : as ``list_confusable`` gives.
-    """
-    names = sorted({name for first, second, _ in confusable for name in (first, second)})
-    if not names:
-        return []
-    apart = 1.0 - np.eye(len(names))
-    for first, second, cosine in confusable:
-        i, j = names.index(first), names.index(second)
-        apart[i, j] = apart[j, i] = 1.0 - abs(cosine)
-    labels = fcluster(linkage(squareform(apart), "complete"), 1.0 - CONFUSABLE, "distance")
-    classes = [[name for name, own in zip(names, labels, strict=True) if own == k] for k in np.unique(labels)]
-    return sorted(each for each in classes if len(each) > 1)

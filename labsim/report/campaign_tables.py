@@ -15,7 +15,6 @@ from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
 from ..diagnosis.misfit import say_misfit
 from ..diagnosis.next_experiment import Suggestion
-from ..diagnosis.screen import group_classes
 from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
@@ -177,7 +176,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             name: total for name, total in found.verdict.inclusion.items() if total >= 1e-4
         },
         "named": [list(hypothesis) for hypothesis, _ in found.verdict.named],
-        "classes": group_classes(found.confusable),
+        "classes": [found.alike] if found.alike else [],
         "confusable": [[first, second, round(cosine, 4)] for first, second, cosine in found.confusable],
         "law": describe_learned(found),
         "misfit": [asdict(part) for part in found.misfit],
@@ -268,7 +267,8 @@ def say_verdict(found: Diagnosis) -> str:
     lead = LEADS.get(next(iter(kinds)), "") if len(kinds) == 1 else ""
     causes = ", and ".join(_say_cause(found, name) for name in best)
     beside = [(h, p) for h, p in found.verdict.named[1:] if set(best) < set(h)]
-    others = [each for each in found.verdict.named[1:] if each not in beside]
+    alike = [name for name in found.alike if name not in best]
+    others = [each for each in found.verdict.named[1:] if each not in beside and each[0][0] not in alike]
     apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in others)
     hardly = f", hardly told from {apart}" if apart else ""
     sure = say_probability(probability)
@@ -280,6 +280,9 @@ def say_verdict(found: Diagnosis) -> str:
         sure = (
             f"{say_probability(found.verdict.of_first)}, alone ({sure}) or beside another cause: {partners}"
         )
+    if alike:
+        together = sum(p for h, p in found.verdict.probabilities if len(h) == 1 and h[0] in found.alike)
+        sure += f", and {say_probability(together)} together with {' and '.join(alike)}, from which these data cannot tell it"
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
     if found.verdict.of_first < 0.5:

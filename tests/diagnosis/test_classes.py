@@ -1,22 +1,38 @@
-"""Causes that a campaign cannot tell apart are one class, where that holds for every two of them."""
+"""Causes whose best fits predict nearly the same are one class, whichever of them has more evidence."""
 
-from labsim.diagnosis.screen import group_classes
+from types import SimpleNamespace
 
+import numpy as np
+import pytest
 
-def test_no_pair_no_class():
-    assert group_classes([]) == []
-
-
-def test_every_two_of_a_class_are_confusable():
-    pairs = [("a", "b", 0.95), ("b", "c", -0.97), ("a", "c", 0.92), ("d", "e", 0.99)]
-    assert group_classes(pairs) == [["a", "b", "c"], ["d", "e"]]
+from labsim.diagnosis.judge import NAMED, find_class
+from labsim.inference.blocks import Block
 
 
-def test_a_chain_of_neighbours_is_not_one_class():
-    """a and c are told apart: the nearer of b's neighbours stays with it."""
-    assert group_classes([("a", "b", 0.93), ("b", "c", 0.98)]) == [["b", "c"]]
+def predict(*causes: str, residual=(0.0, 0.0), sigma=0.5):
+    block = Block(np.array(residual), sigma**2 * np.eye(2), {})
+    return SimpleNamespace(hypothesis=causes, blocks=(block,))
 
 
-def test_the_order_of_the_pairs_does_not_matter():
-    pairs = [("a", "b", 0.95), ("b", "c", -0.97), ("a", "c", 0.92), ("d", "e", 0.99)]
-    assert group_classes(pairs[::-1]) == group_classes(pairs)
+def test_what_is_far_from_all_others_is_no_class():
+    first = predict("gas")
+    assert find_class(first, [first, predict("crust", residual=(5.0, 5.0))]) == ["gas"]
+
+
+def test_what_predicts_the_same_is_one_class_in_any_order():
+    fits = [predict("gas"), predict("tension", residual=(0.1, 0.0)), predict("shear", residual=(0.0, 0.1))]
+    assert find_class(fits[0], fits) == find_class(fits[0], fits[::-1]) == ["gas", "shear", "tension"]
+
+
+def test_of_pairs_no_class_is_stated():
+    assert find_class(predict("gas"), [predict("gas", "crust")]) == ["gas"]
+
+
+@pytest.mark.parametrize("temperature", [1.0, 3.0, 6.0])
+def test_a_class_ends_where_the_truth_would_on_average_be_named_alone(temperature):
+    """Half the squared distance over the temperature is what the ln odds would be."""
+    sigma, odds = 0.5, np.log(NAMED / (1.0 - NAMED))
+    edge = sigma * np.sqrt(2.0 * temperature * odds)
+    for share, alike in ((0.99, ["crust", "gas"]), (1.01, ["gas"])):
+        other = predict("crust", residual=(share * edge, 0.0))
+        assert find_class(predict("gas"), [other], temperature) == alike

@@ -26,16 +26,12 @@ from ..forward import Instant, ResponseTable
 from ..observe_acceleration import BINS, ObservedImpact
 
 # Of the largest deceleration, of a mean over 1/BINS of the stop, where the tip goes USUAL_DEPTH tip radii deep: how far the
-# smoothed force (curves.py), interpolated between nodes, is off from a Lagrangian mesh (benchmarks/acceleration_error.py). The
-# fewer particles a tip passes the rougher its force: all but the last two grow as the depth to the power -ROUGHER. A drop has for
-# itself a part without memory and one of Matérn's 3/2; a smooth part is alike in drops that go alike deep; two are in all drops.
-# The sizes are larger than the benchmark's by half (docs/acceleration-accuracy.md; benchmarks/acceleration_sizes.py).
-FORCE_ROUGHNESS = 0.004
-FORCE_NOISE, FORCE_LENGTH = 0.004, 4.0 / BINS  # the second of the stopping time
-FORCE_SHAPE, SHAPE_LENGTH = 0.015, 0.15
-FORCE_REACH = 0.5  # e-folds of depth over tip radius in which the smooth part changes
+# simulated force is off from another code's. The fewer particles a tip passes the rougher its force: both grow as the depth to
+# the power -ROUGHER. The first is without memory; the second, over SHAPE_LENGTH of the stop, is alike in drops that go alike
+# deep. All have the most evidence over campaigns of a Lagrangian mesh (benchmarks/acceleration_sizes.py).
+FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0032, 0.0087, 0.13
+FORCE_REACH = 0.45  # e-folds of depth over tip radius in which the second changes
 USUAL_DEPTH, ROUGHER = 0.8, 1.0
-FORCE_AT_CONTACT, FORCE_LATE = 0.005, 0.02
 SHORT = 0.05  # of a stretch, over which a slope is taken
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
 KNOWN = 1.5  # stretches, at least, in which contact lies
@@ -64,7 +60,12 @@ class AccelerationModel:
 
     @property
     def data_variance(self) -> FloatArray:
-        return self.observed.noise**2
+        """Of noise, and of what is rough in the simulated force, (m/s²)²."""
+        observed = self.observed
+        stop = float(observed.impact.time[-1])
+        shares = stop / BINS / np.minimum(observed.end - observed.begin, stop)
+        inside = observed.end > observed.contact_time - 0.5 * stop / BINS
+        return observed.noise**2 + np.where(inside, (FORCE_ROUGHNESS * self._scale) ** 2 * shares, 0.0)
 
     @property
     def below(self) -> np.ndarray:
@@ -144,17 +145,6 @@ class AccelerationModel:
             for k, each in enumerate(accelerometer.sensors)
         }
 
-    def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
-        """What the solver's force is off by in all drops: as the tip meets the dust, and later where it goes deeper.
-
-        clock : (n,) s since contact; stop : s; reach : ln of depth over tip radius."""
-        inside = self._share_inside(clock) * (clock < stop)
-        fraction = np.maximum(clock, 0.0) / stop
-        return {
-            "force at contact": FORCE_AT_CONTACT * self._peak * inside * np.exp(-fraction / 0.05),
-            "force late": FORCE_LATE * self._peak * reach * inside * (2.0 * fraction - 1.0),
-        }
-
     def _share_inside(self, clock: FloatArray) -> FloatArray:
         """(n,) of each stretch that lies after contact: errors that come all at once would let no fit settle."""
         return np.clip(0.5 + clock / (self.observed.end - self.observed.begin), 0.0, 1.0)
@@ -182,18 +172,10 @@ class AccelerationModel:
     def _peak(self) -> float:
         return float(np.max(np.abs(self.data)))
 
-    @cached_property
+    @property
     def solver_noise(self) -> FloatArray:
-        """(n, n) root of the covariance of what is particle noise in the force, by columns."""
-        observed = self.observed
-        stop = float(observed.impact.time[-1])
-        width = observed.end - observed.begin
-        shares = np.sqrt(stop / BINS / np.minimum(width, stop))
-        sigma = np.where(observed.end > observed.contact_time - 0.5 * stop / BINS, shares, 0.0)
-        middle = 0.5 * (observed.begin + observed.end) / (FORCE_LENGTH * stop)
-        apart = math.sqrt(3.0) * np.abs(np.subtract.outer(middle, middle))
-        alike = FORCE_NOISE**2 * (1.0 + apart) * np.exp(-apart) + FORCE_ROUGHNESS**2 * np.eye(middle.size)
-        return np.asarray(self._scale * sigma[:, None] * np.linalg.cholesky(alike))
+        """(n, 0): what is rough in the force is without memory."""
+        return np.zeros((self.data.size, 0))
 
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float

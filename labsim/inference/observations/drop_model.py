@@ -125,10 +125,6 @@ class DropModel:
     unit = "m"
     change_counts = True  # two codes differ in the depth by a share of what an effect changes of it
 
-    def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
-        """Nothing beside what all records have."""
-        return {}
-
     def slope(
         self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
     ) -> FloatArray:

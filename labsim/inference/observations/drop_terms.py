@@ -156,7 +156,6 @@ def linearise_drop(
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
         **model.share(here, differ, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
-        **model.share_solver(clock, float(stop), reach),
         "numerical slope": model.slope(code, instrument, instant, here)
         * (reach - USUAL_DEPTH)
         * terms.numerical_slope,

@@ -127,10 +127,6 @@ class PushModel:
         }
         return {**profile, "gauge": np.full(self.data.size, gauge.scale_sigma)}
 
-    def share_solver(self, clock: FloatArray, stop: float, reach: float) -> dict[str, FloatArray]:
-        """Nothing beside what all records have."""
-        return {}
-
     def slope(
         self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
     ) -> FloatArray:
