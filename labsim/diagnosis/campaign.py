@@ -42,10 +42,8 @@ from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import (
-    FELT_TEMPERATURE,
     PREDICTED,
     PRIOR_UNKNOWN,
-    TEMPERATURE,
     Verdict,
     find_class,
     judge,
@@ -93,7 +91,7 @@ class Judgement:
         """The cause named first and those from which these data cannot tell it; none where there are no others."""
         if self.verdict.word != "effect" or len(self.best.hypothesis) != 1:
             return []
-        found = find_class(self.best, self.rivals, _choose_temperature(self.bench))
+        found = find_class(self.best, self.rivals, _list_rough(self.bench))
         return found if len(found) > 1 else []
 
     @property
@@ -169,7 +167,7 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
         list(bench.effects),
         {score.name: score.log_bayes for score in screening.scores},
         predicted,
-        _choose_temperature(bench),
+        _list_rough(bench),
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it
@@ -181,8 +179,9 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
     )
 
 
-def _choose_temperature(bench: Workbench) -> float:
-    return FELT_TEMPERATURE if bench.felt else TEMPERATURE
+def _list_rough(bench: Workbench) -> list[str]:
+    """Causes that change runs, where accelerometers feel what they change."""
+    return [name for name in bench.effects if bench.felt and bench.costs_runs(name)]
 
 
 def judge_scatters(

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from labsim.diagnosis.judge import NAMED, find_class
+from labsim.diagnosis.judge import NAMED, ROUGH_TEMPERATURE, TEMPERATURE, find_class
 from labsim.inference.blocks import Block
 
 
@@ -28,11 +28,14 @@ def test_of_pairs_no_class_is_stated():
     assert find_class(predict("gas"), [predict("gas", "crust")]) == ["gas"]
 
 
-@pytest.mark.parametrize("temperature", [1.0, 3.0, 6.0])
-def test_a_class_ends_where_the_truth_would_on_average_be_named_alone(temperature):
+@pytest.mark.parametrize(
+    ("rough", "temperature"),
+    [((), TEMPERATURE), (("gas",), TEMPERATURE), (("gas", "crust"), ROUGH_TEMPERATURE)],
+)
+def test_a_class_ends_where_the_truth_would_on_average_be_named_alone(rough, temperature):
     """Half the squared distance over the temperature is what the ln odds would be."""
     sigma, odds = 0.5, np.log(NAMED / (1.0 - NAMED))
     edge = sigma * np.sqrt(2.0 * temperature * odds)
     for share, alike in ((0.99, ["crust", "gas"]), (1.01, ["gas"])):
         other = predict("crust", residual=(share * edge, 0.0))
-        assert find_class(predict("gas"), [other], temperature) == alike
+        assert find_class(predict("gas"), [other], rough) == alike

@@ -32,6 +32,9 @@ from ..observe_acceleration import BINS, ObservedImpact
 FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0032, 0.0087, 0.13
 FORCE_REACH = 0.45  # e-folds of depth over tip radius in which the second changes
 USUAL_DEPTH, ROUGHER = 0.8, 1.0
+# of the same, what a cause changes of the force is off by: as much whether it is as large as LARGE or larger, for it is a
+# difference of two rough forces; less in proportion where it is smaller
+FORCE_CHANGE, LARGE = 0.012, 0.03
 SHORT = 0.05  # of a stretch, over which a slope is taken
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
 KNOWN = 1.5  # stretches, at least, in which contact lies
@@ -47,7 +50,6 @@ class AccelerationModel:
     blunt: bool  # the tip has a face
     camera: None = None
     unit: str = "m/s^2"
-    change_counts: bool = False  # two codes' forces differ as much in small changes as in large
 
     @property
     def radius(self) -> float:
@@ -184,6 +186,12 @@ class AccelerationModel:
         e-folds of depth over tip radius, that changes."""
         size = np.hypot(share * np.maximum(self.data, 0.0), FORCE_SHAPE * self._scale)
         return self._share_inside(clock) * size, SHAPE_LENGTH, FORCE_REACH
+
+    def find_change_error(self, change: FloatArray, clock: FloatArray, share: float) -> FloatArray:
+        """What a change of the force, (n,), is off by, m/s²."""
+        inside = self._share_inside(clock)
+        size = math.sqrt(float(np.mean(change[self.below] ** 2))) if np.any(self.below) else 0.0
+        return inside * FORCE_CHANGE * min(self._scale, size / LARGE)
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return self.observed.time

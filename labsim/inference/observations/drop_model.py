@@ -123,7 +123,6 @@ class DropModel:
         }
 
     unit = "m"
-    change_counts = True  # two codes differ in the depth by a share of what an effect changes of it
 
     def slope(
         self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
@@ -142,6 +141,10 @@ class DropModel:
         """What the solver is off by in drops that go alike deep, m; over which share of the stopping time, and over how many
         e-folds of depth over tip radius, that changes."""
         return share * np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0), ALONG, REACH
+
+    def find_change_error(self, change: FloatArray, clock: FloatArray, share: float) -> FloatArray:
+        """Two codes differ by a share of what an effect changes of the depth, m."""
+        return change * share
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         """True times (s) of the data."""

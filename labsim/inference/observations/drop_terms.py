@@ -165,11 +165,11 @@ def linearise_drop(
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
     off, length, changes = model.find_solver_error(here, clock, final, instrument, terms.numerical)
-    change: FloatArray | float = 0.0
-    if model.change_counts and code is not response.plain:
+    if code is not response.plain:
         change = here - model.predict(response.plain, instrument, instant)
+        off = np.hypot(off, model.find_change_error(change, clock, terms.numerical_change))
     numerical = NumericalError(
-        np.hypot(off, change * terms.numerical_change),
+        off,
         np.clip(clock / stop, 0.0, 1.0),
         reach,
         math.log(model.radius),

@@ -44,7 +44,6 @@ class PushModel:
     first: int
     camera: None = None
     unit: str = "1"
-    change_counts: bool = True
     surface_sigma: float = 1.0
 
     @property
@@ -145,6 +144,10 @@ class PushModel:
     ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in all such pushes alike: the same at all depths."""
         return np.full(self.data.size, share), 1.0, REACH
+
+    def find_change_error(self, change: FloatArray, clock: FloatArray, share: float) -> FloatArray:
+        """A share of what an effect changes."""
+        return change * share
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return np.zeros(self.data.size)
