@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,8 @@ from ..inference.fitting import Fit, Hypothesis
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1
 PRIOR_PAIRS = 0.1  # all pairs together
-# among causes: what tells one from another rests on details in which two solvers differ; and among those that change runs which
-# accelerometers feel: what they change of a force is as rough as it is
+# among causes: what tells one from another rests on details in which two solvers differ; and behind one that changes runs which
+# accelerometers feel: what it changes of a force is as rough as that is
 TEMPERATURE, ROUGH_TEMPERATURE = 3.0, 10.0
 # of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
 # most 5.5, the weakest that was 9.6
@@ -88,7 +88,7 @@ def judge(
     off behind it by the difference of their gains over the temperature (NESTED where they are part of the best): they are told
     apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
 
-    rough : causes whose runs differ as roughly as ROUGH_TEMPERATURE says.
+    rough : causes behind which ROUGH_TEMPERATURE holds.
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
     p value of held-out drops with the best cause, or of its own data. Where they are missed, unknown stands to that cause at
     least as its prior does to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p):
@@ -105,9 +105,9 @@ def judge(
     most = max([0.0, *gain.values()])
     ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
     nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
+    temperature = _choose_temperature(ahead, rough)
     for hypothesis, value in gain.items():
         above = max(value, 0.0)
-        temperature = choose_temperature(hypothesis, ahead, rough)
         tempered = most - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
         # what explains less than a part of the best never stands before that part
         behind = [
@@ -133,9 +133,10 @@ def judge(
     return Verdict(word, ranked)
 
 
-def choose_temperature(some: Iterable[str], others: Iterable[str], rough: Collection[str]) -> float:
-    """By which the difference in ln evidence of two hypotheses is divided."""
-    return ROUGH_TEMPERATURE if all(name in rough for name in (*some, *others)) else TEMPERATURE
+def _choose_temperature(first: Collection[str], rough: Collection[str]) -> float:
+    """By which differences in ln evidence from the best are divided: one for all, or one with less could stand before one with
+    more."""
+    return ROUGH_TEMPERATURE if first and set(first) <= set(rough) else TEMPERATURE
 
 
 def find_class(first: Fit, rivals: Sequence[Fit], rough: Collection[str] = ()) -> list[str]:
@@ -144,13 +145,9 @@ def find_class(first: Fit, rivals: Sequence[Fit], rough: Collection[str] = ()) -
     Were one of two fits the truth, the other's ln evidence would on average be behind by half the square of their distance: of
     what they predict, in standard deviations of the data. Over the temperature that has to give it NAMED of the probability.
     """
-    odds = math.log(NAMED / (1.0 - NAMED))
-    names = {first.hypothesis[0]}
-    for other in rivals:
-        temperature = choose_temperature(first.hypothesis, other.hypothesis, rough)
-        if len(other.hypothesis) == 1 and _distance(first, other) < 2.0 * temperature * odds:
-            names.add(other.hypothesis[0])
-    return sorted(names)
+    least = 2.0 * _choose_temperature(first.hypothesis, rough) * math.log(NAMED / (1.0 - NAMED))
+    others = [fit for fit in rivals if len(fit.hypothesis) == 1 and _distance(first, fit) < least]
+    return sorted({fit.hypothesis[0] for fit in (first, *others)})
 
 
 def _distance(one: Fit, other: Fit) -> float:

@@ -30,7 +30,7 @@ def test_of_pairs_no_class_is_stated():
 
 @pytest.mark.parametrize(
     ("rough", "temperature"),
-    [((), TEMPERATURE), (("gas",), TEMPERATURE), (("gas", "crust"), ROUGH_TEMPERATURE)],
+    [((), TEMPERATURE), (("crust",), TEMPERATURE), (("gas", "crust"), ROUGH_TEMPERATURE)],
 )
 def test_a_class_ends_where_the_truth_would_on_average_be_named_alone(rough, temperature):
     """Half the squared distance over the temperature is what the ln odds would be."""

@@ -33,19 +33,28 @@ def test_where_nothing_listed_is_at_work_no_cause_is_named(word):
     "gains", [(50.0, 20.0, 49.0), (30.0, 27.0, 27.5), (50.0, 49.0, 48.9), (4.0, 1.0, -3.0)]
 )
 @pytest.mark.parametrize("lead", [0.5, 6.0, 30.0])
-def test_a_single_with_less_evidence_never_stands_before_one_with_more(gains, lead):
-    """Behind a pair too, whose own singles are softened less than others."""
+@pytest.mark.parametrize("rough", [(), ("first",), ("first", "second"), ("first", "second", "other")])
+def test_a_single_with_less_evidence_never_stands_before_one_with_more(gains, lead, rough):
+    """Behind a pair too, whose own singles are softened less than others; and where some causes are rough."""
     names = ["first", "second", "other"]
     fits = [
         SimpleNamespace(hypothesis=(name,), evidence=gain) for name, gain in zip(names, gains, strict=True)
     ]
     fits.append(SimpleNamespace(hypothesis=("first", "second"), evidence=max(gains) + lead))
     nominal = SimpleNamespace(evidence=0.0)
-    verdict = judge(nominal, fits, -100.0, names, {})
+    verdict = judge(nominal, fits, -100.0, names, {}, rough=rough)
     probability = dict(verdict.probabilities)
     assert sum(probability.values()) == pytest.approx(1.0)
     for (a, x), (b, y) in itertools.combinations(zip(names, gains, strict=True), 2):
         assert (x - y) * (probability[a,] - probability[b,]) > 0.0
+
+
+@pytest.mark.parametrize("names", list(itertools.permutations(["gas", "shear", "mass"])))
+@pytest.mark.parametrize("gains", [(60.0, 50.0, 40.0), (30.0, 29.0, 8.0)])
+def test_among_singles_too_more_evidence_stands_first_whichever_are_rough(names, gains):
+    fits = [SimpleNamespace(hypothesis=(n,), evidence=gain) for n, gain in zip(names, gains, strict=True)]
+    verdict = judge(SimpleNamespace(evidence=0.0), fits, -100.0, names, {}, rough=("gas", "shear"))
+    assert [hypothesis[0] for hypothesis, _ in verdict.probabilities][:3] == list(names)
 
 
 def test_a_cause_is_at_work_alone_or_beside_another():
