@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -41,14 +42,7 @@ from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
-from .judge import (
-    PREDICTED,
-    PRIOR_UNKNOWN,
-    Verdict,
-    find_class,
-    judge,
-    weigh_prior,
-)
+from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .learned_law import LearnedLaw, learn_law
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, return_to_singles, settle_leading
@@ -86,7 +80,7 @@ class Judgement:
     predicted: float
     best: Fit
 
-    @property
+    @cached_property
     def alike(self) -> list[str]:
         """The cause named first and those from which these data cannot tell it; none where there are no others."""
         if self.verdict.word != "effect" or len(self.best.hypothesis) != 1:

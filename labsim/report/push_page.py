@@ -73,7 +73,7 @@ def view_pushes(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[PushV
             own[label] = residual - np.array([shared[int(number)] for number in model.observed.windows])
     views = []
     for model, own in zip(models, left, strict=True):
-        ground = model.solver_noise
+        ground = model.ground_noise
         mean = np.full(model.data.size, 1.0 / model.data.size)
         variance = bench.terms.scatter**2 + float(mean @ (ground @ ground.T) @ mean)
         views.append(

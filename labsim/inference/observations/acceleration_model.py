@@ -125,7 +125,7 @@ class AccelerationModel:
         return 1.0
 
     @property
-    def zeros(self) -> FloatArray:
+    def own_errors(self) -> FloatArray:
         """(n, 1 + sensors): nothing in the place of a camera's surface row, then the zero of each sensor at its stated error."""
         accelerometer = self.observed.drop.accelerometer
         assert accelerometer is not None
@@ -175,11 +175,6 @@ class AccelerationModel:
     def _peak(self) -> float:
         return float(np.max(np.abs(self.data)))
 
-    @property
-    def solver_noise(self) -> FloatArray:
-        """(n, 0): what is rough in the force is without memory."""
-        return np.zeros((self.data.size, 0))
-
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
     ) -> tuple[FloatArray, float, float]:
@@ -214,8 +209,8 @@ def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatA
     """m/s, free fall before contact. In the dust the run's speed over its first: between nodes that is not quite the impact's,
     and a jump of a thousandth within one stretch is a blow."""
     impact = math.exp(instant.log_speed)
-    inside = decode_speed(code, np.maximum(clock, 0.0)) / decode_speed(code, np.zeros(1))
-    return np.where(clock < 0.0, impact + STANDARD_GRAVITY * clock, impact * inside)
+    inside = decode_speed(code, np.append(np.maximum(clock, 0.0), 0.0))
+    return np.where(clock < 0.0, impact + STANDARD_GRAVITY * clock, impact * (inside[:-1] / inside[-1]))
 
 
 def make_acceleration_model(observed: ObservedImpact, table: ResponseTable) -> AccelerationModel:

@@ -103,7 +103,7 @@ class DropModel:
         return -self.predict_speed(code, instrument, instant)
 
     @property
-    def zeros(self) -> FloatArray:
+    def own_errors(self) -> FloatArray:
         """(n, 1): the surface row at its stated error."""
         return np.full((self.matrix.shape[0], 1), self.surface_sigma)
 
@@ -129,11 +129,6 @@ class DropModel:
     ) -> FloatArray:
         """What the solver may be off by a share of from shallow to deep drops, m."""
         return np.maximum(here, 0.0)
-
-    @property
-    def solver_noise(self) -> FloatArray:
-        """(n, 0): depths have none that is not smooth."""
-        return np.zeros((self.data.size, 0))
 
     def find_solver_error(
         self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float

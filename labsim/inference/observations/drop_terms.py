@@ -136,13 +136,13 @@ def linearise_drop(
 
     mass = observed.drop.projectile
     scatter = math.hypot(terms.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
-    zeros = model.zeros
+    own_errors = model.own_errors
     own_strength = by_strength * max(scatter, LEAST_SCATTER)
-    columns = [by_contact * FREE, by_speed * SPEED_WIDTH, zeros[:, 0]]
+    columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
     final, stop = np.exp(code[0]), np.exp(code[1])
-    local = np.column_stack([*columns, zeros[:, 1:], model.solver_noise])
+    local = np.column_stack([*columns, own_errors[:, 1:]])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
 

@@ -102,12 +102,12 @@ class PushModel:
         return np.zeros(self.data.size)
 
     @property
-    def zeros(self) -> FloatArray:
-        """(n, 2): nothing in the place of a camera's surface row, then the zero of the gauge at its stated error."""
+    def own_errors(self) -> FloatArray:
+        """(n, 2 + n): nothing in the place of a camera's surface row, the zero of the gauge at its stated error, the ground."""
         gauge, section = self.observed.drop.gauge, np.pi * self.radius**2
         assert gauge is not None
         offset = gauge.offset_sigma / gauge.per_pressure(section)
-        return np.column_stack([np.zeros(self.data.size), offset / np.exp(self.data)])
+        return np.column_stack([np.zeros(self.data.size), offset / np.exp(self.data), self.ground_noise])
 
     def share(
         self,
@@ -133,7 +133,7 @@ class PushModel:
         return np.zeros(self.data.size)
 
     @cached_property
-    def solver_noise(self) -> FloatArray:
+    def ground_noise(self) -> FloatArray:
         """(n, n) root of the covariance of the ground's own differences, by columns."""
         apart = np.abs(np.subtract.outer(self.observed.depth, self.observed.depth))
         alike = np.exp(-apart / self.ground.length) + 1e-9 * np.eye(self.data.size)
