@@ -267,8 +267,8 @@ def say_verdict(found: Diagnosis) -> str:
     lead = LEADS.get(next(iter(kinds)), "") if len(kinds) == 1 else ""
     causes = ", and ".join(_say_cause(found, name) for name in best)
     beside = [(h, p) for h, p in found.verdict.named[1:] if set(best) < set(h)]
-    alike = [name for name in found.alike if name not in best]
-    others = [each for each in found.verdict.named[1:] if each not in beside and each[0][0] not in alike]
+    alike = [(name,) for name in found.alike if name not in best]
+    others = [(h, p) for h, p in found.verdict.named[1:] if (h, p) not in beside and h not in alike]
     apart = " or ".join(f"{say_hypothesis(h)} ({say_probability(p)})" for h, p in others)
     hardly = f", hardly told from {apart}" if apart else ""
     sure = say_probability(probability)
@@ -281,8 +281,9 @@ def say_verdict(found: Diagnosis) -> str:
             f"{say_probability(found.verdict.of_first)}, alone ({sure}) or beside another cause: {partners}"
         )
     if alike:
-        together = sum(p for h, p in found.verdict.probabilities if len(h) == 1 and h[0] in found.alike)
-        sure += f", and {say_probability(together)} together with {' and '.join(alike)}, from which these data cannot tell it"
+        together = say_probability(probability + sum(p for h, p in found.verdict.probabilities if h in alike))
+        names = " and ".join(map(say_hypothesis, alike))
+        sure += f", and {together} together with {names}, from which these data cannot tell it"
     extended = say_calibrated(found.campaign, float(np.median(found.posterior_extended.calibrated)))
     moved = f"is {extended} instead of {nominal}" if extended != nominal else f"stays {extended}"
     if found.verdict.of_first < 0.5:
