@@ -234,6 +234,20 @@ def test_the_force_of_a_round_tip_begins_at_nought(tip: str, blunt: bool) -> Non
     assert felt < 0.03 * mean or blunt
 
 
+def test_a_shear_factor_is_felt_as_its_square_of_tension() -> None:
+    """Y is a root of the product of both strengths, and a drop hardly pulls its dust apart."""
+    drop = DropSetting(Projectile("hemisphere", 0.5e-3, 2e-6), 0.4, Material(p_m=1300.0), spacing=1.25e-4)
+    weaker = drop.material.tensile_log10_a + 2.0 * math.log10(0.52)
+    changes = ({}, {"shear_factor": 0.52}, {"tensile_log10_a": weaker})
+    codes = [
+        encode_speeds(simulate(drop.replace(material=drop.material.replace(**change)))) for change in changes
+    ]
+    plain, shear, tension = codes
+    np.testing.assert_allclose(shear[:2], tension[:2], atol=5e-4)
+    np.testing.assert_allclose(shear[2:], tension[2:], atol=5e-4)
+    assert np.all(np.abs(shear[:2] - plain[:2]) > 0.05)
+
+
 @pytest.mark.parametrize("overshoot", [-0.9, -1.0, -1.3])
 def test_nuisances_that_go_to_and_fro_settle(overshoot: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step that ends ``overshoot`` times as far off as it began, on the other side, ends at the best after all."""
