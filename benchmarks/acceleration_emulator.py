@@ -4,9 +4,9 @@
 
 The campaign is data/campaigns/f161, its drops at a p_m and with causes that lie between the nodes. Each drop is simulated at its
 own speed, p_m and amplitude, with spacings a few per cent apart: their mean is what single runs scatter about. The table has
-the rms over drops, in %: of the depth, of the stopping time, of the mean force over twentieths of the stop (of the largest); for
-the interpolated run, and for a single one. Below: how far a shear factor f and a tensile factor f², the same but in tension,
-lie apart when simulated and when interpolated.
+the rms over drops, in %: of the depth, of the stopping time, of the mean force over fortieths of the stop, as the likelihood
+compares it (of the largest); for the interpolated run, and for a single one. Below: how far a shear factor f and a tensile
+factor f², the same but in tension, lie apart when simulated and when interpolated.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from acceleration_error import bin_force
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
 from labsim.inference.curves import decode_speed
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.observations import RunFeatures
+from labsim.inference.observe_acceleration import BINS, COMPARED
 from labsim.inference.run_parts import Motion
 from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
@@ -30,15 +32,14 @@ from labsim.inference.workbench import Workbench
 CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f161"
 P_M = 1640.0  # Pa, between nodes
 FACTOR = 0.52
-# effect: amplitude above its null
-CAUSES = {
-    "": 0.0,
-    "shear_strength": FACTOR - 1.0,
-    "tensile_strength": FACTOR**2 - 1.0,
-    "pore_gas": 5500.0,
+# effects with their amplitudes above null
+CAUSES: dict[str, dict[str, float]] = {
+    "none": {},
+    "shear_strength": {"shear_strength": FACTOR - 1.0},
+    "tensile_strength": {"tensile_strength": FACTOR**2 - 1.0},
+    "pore_gas": {"pore_gas": 5500.0},
 }
 SPACINGS = np.linspace(7.6, 8.4, 9)  # in a tip radius; the middle one is FELT_CELLS
-STRETCHES = 20  # of the stop
 
 
 def simulate_at(
@@ -50,8 +51,8 @@ def simulate_at(
     for cause, drop in keys:
         family = bench.families[features[drop].family]
         setting = bench.grid.setting(family, speeds[drop], P_M)
-        if cause:
-            setting = bench.change(cause, CAUSES[cause])(setting)
+        for name, amplitude in CAUSES[cause].items():
+            setting = bench.change(name, amplitude)(setting)
         settings += [setting.replace(spacing=family.projectile.tip_radius / each) for each in SPACINGS]
     runs = bench.grid.store.get_parts(
         settings, [Motion] * len(settings), workers=bench.grid.workers, text="at the place"
@@ -65,8 +66,7 @@ def simulate_at(
 
 
 def find_force(code: np.ndarray, stop: float) -> np.ndarray:
-    ends = np.linspace(0.0, 0.95 * stop, STRETCHES)
-    return -np.diff(decode_speed(code, ends)) / np.diff(ends)
+    return bin_force(lambda time: decode_speed(code, time), stop)[: round(COMPARED * BINS)]
 
 
 def compare(code: np.ndarray, others: np.ndarray) -> list[float]:
@@ -89,16 +89,14 @@ def main() -> None:
         drop: next(each for each in bench.features if each.table is table) for drop, table in tables.items()
     }
     speeds = {model.observed.name: model.observed.impact_speed for model in bench.tracks.models}
-    for cause, amplitude in CAUSES.items():
-        names = (cause,) if cause else ()
-        start = (np.log(P_M), {cause: amplitude} if cause else {})
+    for amplitudes in CAUSES.values():
         # runs are asked for about the place, and nothing is fitted
-        fit_hypothesis(bench, names, start, around=True, iterations=0)
+        fit_hypothesis(bench, tuple(amplitudes), (np.log(P_M), amplitudes), around=True, iterations=0)
     there = simulate_at(bench, features, speeds)
     between = {
-        (cause, drop): tables[drop].code(np.log(P_M), np.log(speeds[drop]), {cause: CAUSES[cause]} if cause else {})
+        (cause, drop): tables[drop].code(np.log(P_M), np.log(speeds[drop]), CAUSES[cause])
         for cause, drop in there
-    }  # fmt: skip
+    }
 
     def show(rows: list[list[float]]) -> str:
         return " | ".join(f"{each:.2f}" for each in np.sqrt(np.mean(np.square(rows), axis=0)))
@@ -108,15 +106,15 @@ def main() -> None:
     for cause in CAUSES:
         interpolated = [compare(between[cause, drop], there[cause, drop]) for drop in speeds]
         single = [compare(there[cause, drop][middle], there[cause, drop]) for drop in speeds]
-        print(f"| {cause or 'none'} | {show(interpolated)} | {show(single)} |")
-    rows = [
-        [
-            compare(codes["shear_strength", drop], codes["tensile_strength", drop][None])
-            for drop in speeds
-        ]
-        for codes in (between, {key: each[middle] for key, each in there.items()})
-    ]  # fmt: skip
-    print(f"| shear less tension | {show(rows[0])} | {show(rows[1])} |")
+        print(f"| {cause} | {show(interpolated)} | {show(single)} |")
+    single_runs = {key: each[middle] for key, each in there.items()}
+    apart = [
+        show(
+            [compare(codes["shear_strength", drop], codes["tensile_strength", drop][None]) for drop in speeds]
+        )
+        for codes in (between, single_runs)
+    ]
+    print(f"| shear less tension | {apart[0]} | {apart[1]} |")
 
 
 if __name__ == "__main__":
