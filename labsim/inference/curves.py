@@ -81,7 +81,8 @@ def encode_speeds(run: DropRun | Motion) -> FloatArray:
 def smooth_change(code: FloatArray, moved: FloatArray, blunt: bool) -> FloatArray:
     """``moved``, a code of speeds, its difference from ``code`` up to the stop a polynomial.
 
-    The difference of two rough forces is as rough as they are, and a law without a name would fit data with it."""
+    For slopes alone: the difference of two rough forces is as rough as they are, and data would be fitted with it. Of a large
+    change the polynomial misses more than roughness is (benchmarks/acceleration_emulator.py)."""
     before, after = (STANDARD_GRAVITY * np.exp(2 * each[1] - each[0]) for each in (code, moved))
     slope = (after - before) * FRACTIONS
     shape = code[2:] + slope + SMOOTH_CHANGE[blunt] @ ((moved - code)[2:] - slope)

@@ -60,7 +60,8 @@ class ResponseTable:
         return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude
 
     def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """``moved``, its difference from ``code`` as smooth as the solver knows it; (m,) each."""
+        """``moved``, its difference from ``code`` as smooth as a slope is known, (m,) each: what is rough in the one run would
+        be fitted by what is rough in the other."""
         return moved if self.smooth_change is None else self.smooth_change(code, moved)
 
     def stack(self, codes: Mapping[float, FloatArray]) -> FloatArray:

@@ -27,6 +27,9 @@ SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
 FEWEST_SPEEDS = 3
+# of drops with an accelerometer: through three nodes 1.7 apart the stopping time is off by up to half a per cent and the force by
+# one (benchmarks/acceleration_emulator.py)
+FELT_RATIO, FEWEST_FELT = math.sqrt(SPEED_RATIO), 4
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
@@ -71,11 +74,13 @@ class Request:
     cells: int | None
 
 
-def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
-    """Nodes of the fixed grid that enclose [slowest, fastest], at least FEWEST_SPEEDS of them; ratio : of one to the next."""
+def speed_nodes(
+    slowest: float, fastest: float, ratio: float = SPEED_RATIO, fewest: int = FEWEST_SPEEDS
+) -> tuple[float, ...]:
+    """Nodes of the fixed grid that enclose [slowest, fastest], at least ``fewest`` of them; ratio : of one to the next."""
     first = math.floor(math.log(slowest / SPEED_ANCHOR) / math.log(ratio) + 1e-9)
     last = math.ceil(math.log(fastest / SPEED_ANCHOR) / math.log(ratio) - 1e-9)
-    while last - first + 1 < FEWEST_SPEEDS:
+    while last - first + 1 < fewest:
         middle = math.log(math.sqrt(slowest * fastest) / SPEED_ANCHOR) / math.log(ratio)
         if middle - first < last - middle:
             first -= 1

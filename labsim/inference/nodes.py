@@ -56,22 +56,21 @@ def amplitude_nodes(
 ) -> list[float]:
     """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits;
     ``around``: one more beyond them, so that the curve between two does not depend on the side that the estimate came from;
-    ``bent``: a small amplitude too lies on a curve, through half the step."""
+    ``bent``: between nodes a quarter of the step apart, half of it beyond the first."""
     parameter = effect.amplitudes[0]
     step = parameter.step
     unit = parameter.grade(step)
     place = parameter.grade(amplitude) / unit
     # of the numerics, much finer runs would cost more than they say
-    if abs(place) <= 1.0 or effect.kind == "numerics":
-        near = 1.0 if place >= 0 else -1.0
-        wanted = [near]
-        if bent and effect.kind != "numerics":
-            wanted.append(0.5 * near)
+    sign = math.copysign(1.0, place)
+    if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
+        wanted = [sign]
     else:
         ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
-        sign = math.copysign(1.0, place)
+        if bent:
+            ladder = sorted({0.25, 0.5, 0.75, 1.5, *ladder})
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
-        below = [m for m in ladder if m < abs(place)] or [1.0]
+        below = [m for m in ladder if m < abs(place)] or above[1:2]
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
     nodes = []
     for m in wanted:

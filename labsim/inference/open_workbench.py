@@ -18,7 +18,18 @@ from ..sph.profile import is_blunt
 from ..sph.tips import make_profile
 from .curves import encode_run, encode_speeds, smooth_change
 from .forward import ResponseTable
-from .grid import FELT_STEPS, PUSH_RATIO, SPEED_RATIO, Family, RunGrid, few_positions, speed_nodes
+from .grid import (
+    FELT_RATIO,
+    FELT_STEPS,
+    FEWEST_FELT,
+    FEWEST_SPEEDS,
+    PUSH_RATIO,
+    SPEED_RATIO,
+    Family,
+    RunGrid,
+    few_positions,
+    speed_nodes,
+)
 from .observations import Observation, RunFeatures, observe_further
 from .observations.acceleration_model import make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
@@ -77,8 +88,10 @@ def open_workbench(
     ]
     for projectile, group in grouped:
         pushes = [drop for drop in group if isinstance(drop, ObservedPush)]
+        felt = any(isinstance(drop, ObservedImpact) for drop in group)
         speeds_seen = [drop.impact_speed for drop in group]
-        nodes, few = _lay_out_speeds(speeds_seen, SPEED_MARGIN, PUSH_RATIO if pushes else SPEED_RATIO)
+        ratio = PUSH_RATIO if pushes else FELT_RATIO if felt else SPEED_RATIO
+        nodes, few = _lay_out_speeds(speeds_seen, SPEED_MARGIN, ratio, FEWEST_FELT if felt else FEWEST_SPEEDS)
         table = ResponseTable(np.log(nodes), few)
         if pushes:
             ground = measure_ground(pushes)
@@ -94,7 +107,6 @@ def open_workbench(
                 sleeves.append(TipSleeves(tuple(with_sleeve), ratios, measure_spread(with_sleeve)))
             continue
         features.append(RunFeatures(len(families), table, encode_run))
-        felt = any(isinstance(drop, ObservedImpact) for drop in group)
         families.append(Family(projectile, nodes, False, few, felt=felt))
         blunt = is_blunt(make_profile(projectile))
         speeds = ResponseTable(np.log(nodes), few, smooth_change=partial(smooth_change, blunt=blunt))
@@ -170,11 +182,11 @@ def extend(bench: Workbench, model: Model) -> None:
 
 
 def _lay_out_speeds(
-    speeds: Sequence[float], margin: float, ratio: float = SPEED_RATIO
+    speeds: Sequence[float], margin: float, ratio: float = SPEED_RATIO, fewest: int = FEWEST_SPEEDS
 ) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
     slowest, fastest = min(speeds) / margin, max(speeds) * margin
-    nodes = speed_nodes(slowest, fastest, ratio)
+    nodes = speed_nodes(slowest, fastest, ratio, fewest)
     return nodes, few_positions(nodes, slowest, fastest)
 
 

@@ -127,9 +127,7 @@ class Workbench:
             entry = kept.setdefault(name, {}).setdefault(index, {})
             table.parameters[name] = self.effects[name].amplitudes[0]
             if codes is not None and plain is not None:
-                entry[amplitude] = np.array(
-                    [table.smooth(*each) - each[0] for each in zip(plain, codes, strict=True)]
-                )
+                entry[amplitude] = codes - plain
 
     def state(self, family: Family, name: str = "") -> DropSetting:
         """The nominal model of one family, or of one of its pushes at its own speed, in the middle of the range of p_m."""

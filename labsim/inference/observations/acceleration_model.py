@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,12 +31,9 @@ from ..observe_acceleration import BINS, ObservedImpact
 # the power -ROUGHER. The first is without memory; the second, over SHAPE_LENGTH of the stop, is alike in drops that go alike
 # deep. With the most evidence over campaigns of a Lagrangian mesh (benchmarks/acceleration_sizes.py) the first is 0.0032 and the
 # second 0.0085, but then a law without a name gains from what is rough in single campaigns.
-FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0045, 0.011, 0.13
-FORCE_REACH = 0.45  # e-folds of depth over tip radius in which the second changes
+FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0045, 0.010, 0.125
+FORCE_REACH = 0.30  # e-folds of depth over tip radius in which the second changes
 USUAL_DEPTH, ROUGHER = 0.8, 1.0
-# of the same, what a cause changes of the force is off by: as much whether it is as large as LARGE or larger, for it is a
-# difference of two rough forces; less in proportion where it is smaller
-FORCE_CHANGE, LARGE = 0.010, 0.03
 SHORT = 0.05  # of a stretch, over which a slope is taken
 SHOWS_CONTACT = 0.15  # of the stop, after which contact is known
 KNOWN = 1.5  # stretches, at least, in which contact lies
@@ -49,6 +47,9 @@ class AccelerationModel:
     table: ResponseTable
     start: Instant
     blunt: bool  # the tip has a face
+    # with an error of what a cause changes, of any size, its own campaigns of another code have less evidence
+    # (benchmarks/acceleration_sizes.py)
+    changes_differ: ClassVar[bool] = False
     camera: None = None
     unit: str = "m/s^2"
 
@@ -182,12 +183,6 @@ class AccelerationModel:
         e-folds of depth over tip radius, that changes."""
         size = np.hypot(share * np.maximum(self.data, 0.0), FORCE_SHAPE * self._scale)
         return self._share_inside(clock) * size, SHAPE_LENGTH, FORCE_REACH
-
-    def find_change_error(self, change: FloatArray, clock: FloatArray, share: float) -> FloatArray:
-        """What a change of the force, (n,), is off by, m/s²."""
-        inside = self._share_inside(clock)
-        size = math.sqrt(float(np.mean(change[self.below] ** 2))) if np.any(self.below) else 0.0
-        return inside * FORCE_CHANGE * min(self._scale, size / LARGE)
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return self.observed.time

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ class DropModel:
     table: ResponseTable
     start: Instant
     matrix: FloatArray
+    changes_differ: ClassVar[bool] = True
 
     @property
     def radius(self) -> float:
@@ -136,10 +138,6 @@ class DropModel:
         """What the solver is off by in drops that go alike deep, m; over which share of the stopping time, and over how many
         e-folds of depth over tip radius, that changes."""
         return share * np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0), ALONG, REACH
-
-    def find_change_error(self, change: FloatArray, clock: FloatArray, share: float) -> FloatArray:
-        """Two codes differ by a share of what an effect changes of the depth, m."""
-        return change * share
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         """True times (s) of the data."""

@@ -36,7 +36,7 @@ class Terms:
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.005  # of the depth, smooth
-    numerical_change: float = 0.03  # of what an effect changes of the depth, smooth
+    numerical_change: float = 0.03  # of what an effect changes of a depth or of a push's resistance, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
     # of ln p_m, common to all drops: what another code asks for (docs/error-budget.md)
@@ -132,6 +132,7 @@ def linearise_drop(
         if np.array_equal(moved, code) and point.instruments[name] == instrument:
             tangents[probe] = np.zeros(n)
         else:
+            moved = model.table.smooth(code, moved)
             tangents[probe] = (model.predict(moved, point.instruments[name], instant) - here) / point.step
 
     mass = observed.drop.projectile
@@ -165,9 +166,9 @@ def linearise_drop(
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
     off, length, changes = model.find_solver_error(here, clock, final, instrument, terms.numerical)
-    if code is not response.plain:
+    if model.changes_differ and code is not response.plain:
         change = here - model.predict(response.plain, instrument, instant)
-        off = np.hypot(off, model.find_change_error(change, clock, terms.numerical_change))
+        off = np.hypot(off, terms.numerical_change * change)
     numerical = NumericalError(
         off,
         np.clip(clock / stop, 0.0, 1.0),

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,6 +43,7 @@ class PushModel:
     table: ResponseTable
     ground: Ground
     first: int
+    changes_differ: ClassVar[bool] = True
     camera: None = None
     unit: str = "1"
     surface_sigma: float = 1.0
@@ -144,10 +146,6 @@ class PushModel:
     ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in all such pushes alike: the same at all depths."""
         return np.full(self.data.size, share), 1.0, REACH
-
-    def find_change_error(self, change: FloatArray, clock: FloatArray, share: float) -> FloatArray:
-        """A share of what an effect changes."""
-        return change * share
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return np.zeros(self.data.size)
