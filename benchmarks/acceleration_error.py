@@ -18,7 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from labsim.inference.curves import decode_speed, encode_speeds
-from labsim.inference.grid import FELT_CELLS, interpolation_weights, speed_nodes, strength_node
+from labsim.inference.grid import (
+    FELT_CELLS,
+    FELT_RATIO,
+    FEWEST_FELT,
+    interpolation_weights,
+    smooth_weights,
+    speed_nodes,
+    strength_node,
+)
 from labsim.inference.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
@@ -93,8 +101,8 @@ def compare_interpolated() -> None:
     """What a fit sees, by depth."""
     radius, heavier = PROJECTILE
     mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * radius**3 * heavier
-    speeds = speed_nodes(min(SPEEDS), max(SPEEDS))
-    strengths = [strength_node(k) for k in range(-1, 3)]
+    speeds = speed_nodes(min(SPEEDS), max(SPEEDS), FELT_RATIO, FEWEST_FELT)
+    strengths = [strength_node(0.5 * k) for k in range(-1, 5)]
     codes = np.array(
         [
             [
@@ -118,7 +126,7 @@ def compare_interpolated() -> None:
     for p_m, speed in product(BETWEEN, SPEEDS):
         run = mesh.run_drop(mesh.Dust(p_m=p_m), radius, speed, mesh.Numerics(cells=12.0), mass=mass)
         reference = bin_force(lambda t, run=run: np.interp(t, run.time, run.speed), run.stopping_time)
-        by_strength = interpolation_weights(np.log(strengths), math.log(p_m))
+        by_strength = smooth_weights(np.log(strengths), math.log(p_m))
         by_speed = interpolation_weights(np.log(speeds), math.log(speed))
         code = np.einsum("i,j,ijk->k", by_speed, by_strength, codes)
         seen = bin_force(lambda t, code=code: decode_speed(code, t), math.exp(code[1]))

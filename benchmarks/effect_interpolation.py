@@ -2,10 +2,10 @@
 
     python benchmarks/effect_interpolation.py [--workers 2]
 
-At a tenth, a quarter, half and three quarters of an effect's step: what the effect changes of the deceleration, and how far the
-interpolated one is off from a simulation at that amplitude, on the straight line to one run at the step and on the curve through
-the runs of labsim.inference.nodes. In % of the largest deceleration, rms of three drops; both smoothed to a cubic in time, since
-each run is rough.
+At a tenth, 0.35, 0.6 and 0.85 of an effect's step, between the amplitudes that are simulated: what the effect changes of the
+deceleration, and how far the interpolated one is off from a simulation at that amplitude, on the straight line to one run at the
+step and on the curve through the runs of labsim.inference.nodes. In % of the largest deceleration, rms of three drops; both
+smoothed to a cubic in time, since each run is rough.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ EFFECTS = (
     "strength_rate", "shear_strength", "tensile_strength", "strength_slope", "surface_crust", "pore_gas",
     "density_gradient", "side_friction",
 )  # fmt: skip
-SHARES = (0.1, 0.25, 0.5, 0.75)
+SHARES = (0.1, 0.35, 0.6, 0.85)
 
 
 def run(asked: tuple[str, float, float]) -> np.ndarray:
@@ -59,7 +59,10 @@ def main() -> None:
         parameter = effect.amplitudes[0]
         places[name] = [parameter.amplitude_at(share * parameter.grade(parameter.step)) for share in SHARES]
     amplitudes = {
-        name: {*places[name], *(node for a in places[name] for node in amplitude_nodes(effect, a, bent=True))}
+        name: {
+            *places[name],
+            *(node for a in places[name] for node in amplitude_nodes(effect, a, around=True, bent=True)),
+        }
         for name, effect in effects.items()
     }
     asked = [("", 0.0, speed) for speed in SPEEDS]
@@ -76,7 +79,7 @@ def main() -> None:
                 stop = math.exp(min(plain[1], true[1]))
                 found = [find_force(plain, stop)]
                 for bent in (False, True):
-                    nodes = amplitude_nodes(effect, a, bent=bent)
+                    nodes = amplitude_nodes(effect, a, around=bent, bent=bent)
                     grades = [0.0, *map(parameter.grade, nodes)]
                     runs = np.array([plain, *(codes[name, node, speed] for node in nodes)])
                     found.append(find_force(smooth_weights(grades, parameter.grade(a)) @ runs, stop))

@@ -56,7 +56,7 @@ def amplitude_nodes(
 ) -> list[float]:
     """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits;
     ``around``: one more beyond them, so that the curve between two does not depend on the side that the estimate came from;
-    ``bent``: between nodes a quarter of the step apart, half of it beyond the first."""
+    ``bent``: between nodes a quarter of the step apart, half of it beyond the first; ``coarse``: with few of them."""
     parameter = effect.amplitudes[0]
     step = parameter.step
     unit = parameter.grade(step)
@@ -68,7 +68,7 @@ def amplitude_nodes(
     else:
         ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
         if bent:
-            ladder = sorted({0.25, 0.5, 0.75, 1.5, *ladder})
+            ladder = sorted({0.5, *ladder} if coarse else {0.25, 0.5, 0.75, 1.5, *ladder})
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
         below = [m for m in ladder if m < abs(place)] or above[1:2]
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
