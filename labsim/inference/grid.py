@@ -37,6 +37,8 @@ PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance 
 INERTIA = 0.005  # ρ v² of a push over its resistance
 # of drops with an accelerometer, of fingerprints too: the force needs more than the depth does (benchmarks/acceleration_error.py)
 FELT_CELLS = 8
+# a run's force is rough where its particles happen to lie: the nominal model there is the mean over these factors on the spacing
+FELT_SPACINGS = (1.0, 0.95, 1.05)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
 # (benchmarks/effect_roughness.py)
 FELT_STEPS = 4.0
@@ -66,12 +68,14 @@ class Request:
     """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
     cells : spacings in a tip radius, at the few speeds that fingerprints need; None for all speeds at the base's own spacing.
+    of_felt : of families with an accelerometer alone.
     """
 
     variant: str
     change: Change | None
     index: float
     cells: int | None
+    of_felt: bool = False
 
 
 def speed_nodes(
@@ -229,6 +233,7 @@ class RunGrid:
             for request in dict.fromkeys(wanted)
             for number in range(len(self.families))
             if (request.variant, request.index, request.cells, number) not in self.runs
+            and (self.families[number].felt or not request.of_felt)
         ]
         settings, places = [], []
         parts: list[Part] = []
