@@ -20,11 +20,9 @@ import numpy as np
 from labsim.inference.curves import decode_speed, encode_speeds
 from labsim.inference.grid import (
     FELT_CELLS,
-    FELT_RATIO,
-    FEWEST_FELT,
     interpolation_weights,
+    own_speeds,
     smooth_weights,
-    speed_nodes,
     strength_node,
 )
 from labsim.inference.observe_acceleration import BINS, COMPARED
@@ -101,7 +99,7 @@ def compare_interpolated() -> None:
     """What a fit sees, by depth."""
     radius, heavier = PROJECTILE
     mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * radius**3 * heavier
-    speeds = speed_nodes(min(SPEEDS), max(SPEEDS), FELT_RATIO, FEWEST_FELT)
+    speeds = own_speeds(SPEEDS)
     strengths = [strength_node(0.5 * k) for k in range(-1, 5)]
     codes = np.array(
         [

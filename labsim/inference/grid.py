@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -27,9 +28,10 @@ SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
 FEWEST_SPEEDS = 3
-# of drops with an accelerometer: through three nodes 1.7 apart the stopping time is off by up to half a per cent and the force by
-# one (benchmarks/acceleration_emulator.py)
-FELT_RATIO, FEWEST_FELT = math.sqrt(SPEED_RATIO), 4
+# of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time is off by up
+# to half a per cent and the force by one (benchmarks/acceleration_emulator.py). Drops nearer than SAME_SPEED share a node, one
+# alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
+SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, math.sqrt(SPEED_RATIO)
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
@@ -37,8 +39,8 @@ PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance 
 INERTIA = 0.005  # ρ v² of a push over its resistance
 # of drops with an accelerometer, of fingerprints too: the force needs more than the depth does (benchmarks/acceleration_error.py)
 FELT_CELLS = 8
-# a run's force is rough where its particles happen to lie: the nominal model there is the mean over these factors on the spacing
-FELT_SPACINGS = (1.0, 0.95, 1.05)
+# a run's force is rough where its particles happen to lie: the mean over these factors on the spacing is compared
+FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
 # (benchmarks/effect_roughness.py)
 FELT_STEPS = 4.0
@@ -62,35 +64,52 @@ class Family:
     pushed: bool = False
     felt: bool = False
 
+    @property
+    def spacings(self) -> tuple[float, ...]:
+        """Factors on the usual spacing of which there is a run each."""
+        return FELT_SPACINGS if self.felt else (1.0,)
+
 
 @dataclass(frozen=True)
 class Request:
     """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
     cells : spacings in a tip radius, at the few speeds that fingerprints need; None for all speeds at the base's own spacing.
-    of_felt : of families with an accelerometer alone.
     """
 
     variant: str
     change: Change | None
     index: float
     cells: int | None
-    of_felt: bool = False
 
 
-def speed_nodes(
-    slowest: float, fastest: float, ratio: float = SPEED_RATIO, fewest: int = FEWEST_SPEEDS
-) -> tuple[float, ...]:
-    """Nodes of the fixed grid that enclose [slowest, fastest], at least ``fewest`` of them; ratio : of one to the next."""
+def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
+    """Nodes of the fixed grid that enclose [slowest, fastest], at least FEWEST_SPEEDS of them; ratio : of one to the next."""
     first = math.floor(math.log(slowest / SPEED_ANCHOR) / math.log(ratio) + 1e-9)
     last = math.ceil(math.log(fastest / SPEED_ANCHOR) / math.log(ratio) - 1e-9)
-    while last - first + 1 < fewest:
+    while last - first + 1 < FEWEST_SPEEDS:
         middle = math.log(math.sqrt(slowest * fastest) / SPEED_ANCHOR) / math.log(ratio)
         if middle - first < last - middle:
             first -= 1
         else:
             last += 1
     return tuple(SPEED_ANCHOR * ratio**k for k in range(first, last + 1))
+
+
+def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
+    """Nodes at the speeds of drops with an accelerometer, of three digits, at least two of them."""
+    alike: list[list[float]] = []
+    for speed in sorted(speeds):
+        if alike and speed < SAME_SPEED * alike[-1][0]:
+            alike[-1].append(speed)
+        else:
+            alike.append([speed])
+    if len(alike) > MOST_SPEEDS:
+        return speed_nodes(min(speeds), max(speeds), FELT_RATIO)
+    nodes = [math.sqrt(each[0] * each[-1]) for each in alike]
+    if len(nodes) == 1:
+        nodes = [nodes[0] / SAME_SPEED, nodes[0] * SAME_SPEED]
+    return tuple(float(f"{node:.3g}") for node in nodes)
 
 
 def few_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
@@ -205,7 +224,7 @@ def hasten(setting: DropSetting) -> DropSetting:
 
 @dataclass
 class RunGrid:
-    """Access to runs by (variant, p_m node, cells, family), each in the order of its speeds."""
+    """Access to runs by (variant, p_m node, cells, family), each in the order of its speeds, and of the spacings at each."""
 
     campaign: Campaign
     store: RunStore
@@ -233,21 +252,23 @@ class RunGrid:
             for request in dict.fromkeys(wanted)
             for number in range(len(self.families))
             if (request.variant, request.index, request.cells, number) not in self.runs
-            and (self.families[number].felt or not request.of_felt)
         ]
         settings, places = [], []
         parts: list[Part] = []
         for request, number in missing:
             family = self.families[number]
             positions = range(len(family.speeds)) if request.cells is None else family.few
-            for position in positions:
+            spacings = family.spacings if request.cells is None else (1.0,)
+            for position, factor in product(positions, spacings):
                 setting = self.setting(
                     family, family.speeds[position], strength_node(request.index), request.cells
                 )
                 setting = request.change(setting) if request.change is not None else setting
+                if factor != 1.0:
+                    setting = setting.replace(spacing=factor * setting.spacing)
                 settings.append(hasten(setting) if family.pushed else setting)
                 parts.append(Push if family.pushed else Compaction if family.is_scan else Motion)
-            places.append((request, number, len(positions)))
+            places.append((request, number, len(positions) * len(spacings)))
         if not settings:
             return
         runs = self.store.get_parts(
@@ -266,7 +287,7 @@ class RunGrid:
     def stopped_runs(
         self, variant: str, index: float, cells: int | None, number: int
     ) -> list[AnyPart] | None:
-        """Runs of one family, in the order of its speeds, or None where one failed or never stopped."""
+        """Runs of one family, in the order of its speeds and spacings, or None where one failed or never stopped."""
         runs = self.runs[variant, index, cells, number]
         good = [run for run in runs if not isinstance(run, FailedRun) and run.stopped]
         return good if len(good) == len(runs) else None

@@ -19,15 +19,13 @@ from ..sph.tips import make_profile
 from .curves import encode_run, encode_speeds, smooth_change
 from .forward import ResponseTable
 from .grid import (
-    FELT_RATIO,
     FELT_STEPS,
-    FEWEST_FELT,
-    FEWEST_SPEEDS,
     PUSH_RATIO,
     SPEED_RATIO,
     Family,
     RunGrid,
     few_positions,
+    own_speeds,
     speed_nodes,
 )
 from .observations import Observation, RunFeatures, observe_further
@@ -90,8 +88,11 @@ def open_workbench(
         pushes = [drop for drop in group if isinstance(drop, ObservedPush)]
         felt = any(isinstance(drop, ObservedImpact) for drop in group)
         speeds_seen = [drop.impact_speed for drop in group]
-        ratio = PUSH_RATIO if pushes else FELT_RATIO if felt else SPEED_RATIO
-        nodes, few = _lay_out_speeds(speeds_seen, SPEED_MARGIN, ratio, FEWEST_FELT if felt else FEWEST_SPEEDS)
+        if felt:
+            nodes = own_speeds(speeds_seen)
+            few = few_positions(nodes, min(nodes), max(nodes))
+        else:
+            nodes, few = _lay_out_speeds(speeds_seen, SPEED_MARGIN, PUSH_RATIO if pushes else SPEED_RATIO)
         table = ResponseTable(np.log(nodes), few)
         if pushes:
             ground = measure_ground(pushes)
@@ -182,11 +183,11 @@ def extend(bench: Workbench, model: Model) -> None:
 
 
 def _lay_out_speeds(
-    speeds: Sequence[float], margin: float, ratio: float = SPEED_RATIO, fewest: int = FEWEST_SPEEDS
+    speeds: Sequence[float], margin: float, ratio: float = SPEED_RATIO
 ) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
     slowest, fastest = min(speeds) / margin, max(speeds) * margin
-    nodes = speed_nodes(slowest, fastest, ratio, fewest)
+    nodes = speed_nodes(slowest, fastest, ratio)
     return nodes, few_positions(nodes, slowest, fastest)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from ..sph import DropSetting
 from .forward import ResponseTable
 from .grid import (
     COARSE_CELLS,
-    FELT_SPACINGS,
     Change,
     Family,
     Request,
@@ -50,7 +48,6 @@ class Workbench:
     shape_evidence: dict[str, float] = field(default_factory=dict)
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
     model: Model | None = None  # what the nominal model is extended by
-    _based: set[tuple[int, float]] = field(default_factory=set, repr=False)
     # what the tables hold already, and codes of the nominal model: encoding a run means seeing it through every scan
     _filled: set[tuple[int, float, str, int | None]] = field(default_factory=set, repr=False)
     _plain: dict[tuple[int, float, int | None], list[tuple[ResponseTable, FloatArray | None]]] = field(
@@ -98,13 +95,17 @@ class Workbench:
     def _encode(
         self, number: int, index: float, variant: str, cells: int | None
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
-        """Codes of the runs of one family, (speeds, m), for each table that rests on them; None where a run failed."""
+        """Codes of one family, (speeds, m), means over spacings, for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
-        return [
-            (each.table, None if runs is None else np.array([each.encode(run) for run in runs]))
-            for each in self.features
-            if each.family == number
-        ]
+        alike = len(self.families[number].spacings) if cells is None else 1
+
+        def encode(each: RunFeatures) -> FloatArray | None:
+            if runs is None:
+                return None
+            codes = np.array([each.encode(run) for run in runs])
+            return np.asarray(codes.reshape(-1, alike, codes.shape[1]).mean(axis=1))
+
+        return [(each.table, encode(each)) for each in self.features if each.family == number]
 
     def _encode_plain(
         self, number: int, index: float, cells: int | None
@@ -115,20 +116,9 @@ class Workbench:
         return self._plain[number, index, cells]
 
     def _fill_base(self, number: int, index: float) -> None:
-        if (number, index) in self._based:
-            return
-        self._based.add((number, index))
-        spacings = FELT_SPACINGS if self.families[number].felt else (1.0,)
-        ways = [
-            self._encode_plain(number, index, None)
-            if factor == 1.0
-            else self._encode(number, index, f"spacing {factor:g}", None)
-            for factor in spacings
-        ]
-        for alike in zip(*ways, strict=True):
-            codes = [each for _, each in alike if each is not None]
-            if codes:
-                alike[0][0].base[index] = np.mean(codes, axis=0)
+        for table, codes in self._encode_plain(number, index, None):
+            if codes is not None:
+                table.base[index] = codes
 
     def _fill_change(self, number: int, index: float, name: str, amplitude: float, cells: int | None) -> None:
         variant = self._variant(name, amplitude)
@@ -186,14 +176,7 @@ class Workbench:
         return f"{self.renamed.get(name, name)} {amplitude:.9g}"
 
     def require_base(self, indices: Sequence[float]) -> None:
-        wanted = [Request("", None, index, None) for index in indices]
-        wanted += [
-            Request(f"spacing {factor:g}", partial(_space, factor), index, None, of_felt=True)
-            for factor in FELT_SPACINGS
-            if factor != 1.0
-            for index in indices
-        ]
-        self.grid.require(wanted, "nominal model")
+        self.grid.require([Request("", None, index, None) for index in indices], "nominal model")
         for number in range(len(self.families)):
             for index in indices:
                 self._fill_base(number, index)
@@ -271,7 +254,3 @@ class Workbench:
 
     def costs_runs(self, name: str) -> bool:
         return self.effects[name].costs_runs and not self.strength_only(name)
-
-
-def _space(factor: float, setting: DropSetting) -> DropSetting:
-    return setting.replace(spacing=factor * setting.spacing)
