@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly
 
-from ..records import STANDARD_GRAVITY, FloatArray
+from ..records import FloatArray
 from ..sph import DropRun
 from ..sph.profile import is_blunt
 from ..sph.tips import make_profile
@@ -19,7 +19,6 @@ from .run_parts import Motion
 FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)
 UNIT_SPLINES = np.ascontiguousarray(CubicSpline(FRACTIONS, np.eye(FRACTIONS.size)).c)
-CHANGE = 5  # degree of the polynomial that a small change of the speed up to the stop follows
 PIECES = 4  # of the spline through the speed up to the stop
 
 
@@ -46,18 +45,7 @@ def _smooth_to_the_stop(blunt: bool) -> tuple[FloatArray, FloatArray]:
     return whole, slope
 
 
-def _smooth_change(blunt: bool) -> FloatArray:
-    """(n, n) from changes at FRACTIONS to those of a polynomial of degree CHANGE, fitted up to the stop; of a tip that is not
-    blunt without a slope at contact."""
-    inside = FRACTIONS <= 1.0
-    powers = FRACTIONS[inside, None] ** np.delete(np.arange(CHANGE + 1), [] if blunt else [1])
-    whole = np.eye(FRACTIONS.size)
-    whole[np.ix_(inside, inside)] = powers @ np.linalg.pinv(powers)
-    return whole
-
-
 SMOOTHED = {blunt: _smooth_to_the_stop(blunt) for blunt in (False, True)}
-SMOOTH_CHANGE = {blunt: _smooth_change(blunt) for blunt in (False, True)}
 
 
 def encode_run(run: DropRun | Motion) -> FloatArray:
@@ -76,17 +64,6 @@ def encode_speeds(run: DropRun | Motion) -> FloatArray:
     smoothed, sloped = SMOOTHED[is_blunt(make_profile(run.setting.projectile))]
     shape = smoothed @ speed * stop / depth + sloped * run.setting.gravity * stop**2 / depth
     return np.concatenate([[np.log(depth), np.log(stop)], shape])
-
-
-def smooth_change(code: FloatArray, moved: FloatArray, blunt: bool) -> FloatArray:
-    """``moved``, a code of speeds, its difference from ``code`` up to the stop a polynomial.
-
-    For slopes alone: the difference of two rough forces is as rough as they are, and data would be fitted with it. Of a large
-    change the polynomial misses more than roughness is (benchmarks/acceleration_emulator.py)."""
-    before, after = (STANDARD_GRAVITY * np.exp(2 * each[1] - each[0]) for each in (code, moved))
-    slope = (after - before) * FRACTIONS
-    shape = code[2:] + slope + SMOOTH_CHANGE[blunt] @ ((moved - code)[2:] - slope)
-    return np.concatenate([moved[:2], shape])
 
 
 def decode_speed(code: FloatArray, time: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ difference its own runs made, a smooth curve in its amplitude that vanishes at n
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ class ResponseTable:
     """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the base at all speeds.
     fingerprints : the same from coarser runs at the few speeds, taken where there are no changes. parameters : of effects whose
-    amplitudes have a grade of their own. smooth_change : what ``smooth`` does, where codes are rough."""
+    amplitudes have a grade of their own."""
 
     log_speeds: FloatArray
     few: tuple[int, ...]
@@ -35,7 +35,6 @@ class ResponseTable:
     changes: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
-    smooth_change: Callable[[FloatArray, FloatArray], FloatArray] | None = None
     _stacks: dict[int, tuple[Mapping[float, FloatArray], FloatArray]] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -58,11 +57,6 @@ class ResponseTable:
     def grade(self, name: str, amplitude: float) -> float:
         """Where an amplitude of an effect lies on the scale on which codes are interpolated."""
         return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude
-
-    def smooth(self, code: FloatArray, moved: FloatArray) -> FloatArray:
-        """``moved``, its difference from ``code`` as smooth as a slope is known, (m,) each: what is rough in the one run would
-        be fitted by what is rough in the other."""
-        return moved if self.smooth_change is None else self.smooth_change(code, moved)
 
     def stack(self, codes: Mapping[float, FloatArray]) -> FloatArray:
         """The codes of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""

@@ -14,9 +14,7 @@ from ..effects.terms import apply_law
 from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..sph import DropSetting
-from ..sph.profile import is_blunt
-from ..sph.tips import make_profile
-from .curves import encode_run, encode_speeds, smooth_change
+from .curves import encode_run, encode_speeds
 from .forward import ResponseTable
 from .grid import (
     FELT_STEPS,
@@ -109,8 +107,7 @@ def open_workbench(
             continue
         features.append(RunFeatures(len(families), table, encode_run))
         families.append(Family(projectile, nodes, False, few, felt=felt))
-        blunt = is_blunt(make_profile(projectile))
-        speeds = ResponseTable(np.log(nodes), few, smooth_change=partial(smooth_change, blunt=blunt))
+        speeds = ResponseTable(np.log(nodes), few)
         if felt:
             of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
         models += [

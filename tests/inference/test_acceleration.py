@@ -20,7 +20,7 @@ from labsim.diagnosis.gain import predict_held_out
 from labsim.effects import Instrument
 from labsim.inference import steps
 from labsim.inference.calibrate import calibrate, prepare
-from labsim.inference.curves import FRACTIONS, decode_speed, encode_speeds, smooth_change
+from labsim.inference.curves import decode_speed, encode_speeds
 from labsim.inference.observations.acceleration_model import AccelerationModel
 from labsim.inference.scatter import estimate_scatter, set_terms
 from labsim.inference.tangents import linearise_at
@@ -263,17 +263,3 @@ def test_nuisances_that_go_to_and_fro_settle(overshoot: float, monkeypatch: pyte
     begin = SimpleNamespace(place=steps.Place(0.0, {}, (np.array([1.0]),)), height=0.0)
     end = steps.settle_nuisances(None, begin, 12)  # type: ignore[arg-type]
     assert abs(end.place.nuisances[0][0]) < 0.1
-
-
-@pytest.mark.parametrize("blunt", [False, True])
-def test_a_change_of_a_rough_force_is_smooth(blunt: bool) -> None:
-    """What is no polynomial does not come through; what is one does, as does all beyond the stop. D and T stay here."""
-    inside = FRACTIONS <= 1.0
-    rough = np.where(inside, np.sin(40.0 * FRACTIONS), 0.0)
-    cubic = np.where(inside, 1.0 - 2.0 * FRACTIONS * blunt - FRACTIONS**2 + FRACTIONS**3, 0.3)
-    code = np.concatenate([[-7.0, -6.0], 1.0 - FRACTIONS])
-    for change, comes in ((cubic, 1.0), (rough, 0.0)):
-        moved = code + np.concatenate([[0.0, 0.0], change])
-        left = (smooth_change(code, moved, blunt) - code)[2:] - comes * change
-        assert np.std(left[inside]) < (1e-10 if comes else 0.25 * np.std(rough[inside]))
-        np.testing.assert_allclose(left[~inside], 0.0, atol=1e-10)

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, list_effects
-from labsim.inference.grid import FELT_STEPS, interpolation_weights, smooth_weights, strength_node
+from labsim.inference.grid import (
+    FELT_STEPS,
+    SAME_SPEED,
+    interpolation_weights,
+    own_speeds,
+    smooth_weights,
+    strength_node,
+)
 from labsim.inference.nodes import amplitude_nodes, nodes_around
 
 
@@ -103,6 +110,24 @@ def test_a_factor_beside_rough_runs_lies_within_a_third_of_the_next(factor):
     above = int(np.searchsorted(simulated, factor))
     assert 0 < above < simulated.size
     assert simulated[above] / simulated[above - 1] < 1.34
+
+
+@pytest.mark.parametrize(
+    ("speeds", "count"),
+    [([0.3], 2), ([0.3, 0.31], 2), ([0.23, 0.314, 0.487], 3), ([0.2, 0.21, 0.4, 0.401], 2)],
+)
+def test_a_felt_drop_is_simulated_at_its_own_speed_or_between_near_ones(speeds, count):
+    nodes = own_speeds(speeds)
+    assert list(nodes) == sorted(set(nodes)) and len(nodes) == count
+    for speed in speeds:
+        assert min(abs(math.log(speed / node)) for node in nodes) < math.log(SAME_SPEED) + 0.005
+
+
+def test_many_felt_drops_share_a_grid_of_speeds():
+    speeds = np.geomspace(0.2, 0.8, 9)
+    nodes = own_speeds(speeds)
+    assert nodes[0] <= speeds[0] and speeds[-1] <= nodes[-1] and len(nodes) < speeds.size
+    assert set(nodes) > set(own_speeds(speeds[1:-1]))
 
 
 def test_a_step_that_doubles_a_strength_is_not_made_longer():

@@ -122,7 +122,7 @@ def linearise_drop(
     fast_code = model.table.code(lp, faster.log_speed, nominal.amplitudes)
     by_speed = (model.predict(fast_code, instrument, faster) - here) / 1e-3
     strong_code = model.table.code(lp + 1e-2, instant.log_speed, nominal.amplitudes)
-    by_strength = (model.predict(model.table.smooth(code, strong_code), instrument, instant) - here) / 1e-2
+    by_strength = (model.predict(strong_code, instrument, instant) - here) / 1e-2
 
     tangents = {"ln_p_m": by_strength}
     for probe, point in probes.items():
@@ -132,7 +132,6 @@ def linearise_drop(
         if np.array_equal(moved, code) and point.instruments[name] == instrument:
             tangents[probe] = np.zeros(n)
         else:
-            moved = model.table.smooth(code, moved)
             tangents[probe] = (model.predict(moved, point.instruments[name], instant) - here) / point.step
 
     mass = observed.drop.projectile
