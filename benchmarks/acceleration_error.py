@@ -18,13 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from labsim.inference.curves import decode_speed, encode_speeds
-from labsim.inference.grid import (
-    FELT_CELLS,
-    interpolation_weights,
-    own_speeds,
-    smooth_weights,
-    strength_node,
-)
+from labsim.inference.grid import FELT_CELLS, FELT_SPACINGS
 from labsim.inference.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
@@ -45,10 +39,10 @@ DROPS = (
 )
 STRENGTHS = (1000.0, 2200.0)  # Pa
 LAGS = (1, 2, 4, 8)  # stretches
-# what a fit sees: radius (m), mass over a bead's; speeds (m/s) and p_m (Pa) between the nodes
+# by depth: radius (m), mass over a bead's; speeds (m/s) and p_m (Pa)
 PROJECTILE = (0.75e-3, 1.0)
 SPEEDS = (0.22, 0.26, 0.31, 0.36, 0.43, 0.52, 0.62, 0.74)
-BETWEEN = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2400.0)
+SOME = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2400.0)
 BANDS = (0.4, 0.55, 0.75, 1.0, 1.3, 2.2)  # of depth over tip radius
 
 
@@ -56,6 +50,17 @@ def bin_force(speed_at: Callable[[np.ndarray], np.ndarray], stop: float) -> np.n
     """Mean deceleration (m/s²) over each stretch."""
     edges = np.linspace(0.0, stop, BINS + 1)
     return -np.diff(speed_at(edges)) / np.diff(edges)
+
+
+def simulate_codes(radius: float, mass: float, speed: float, p_m: float) -> np.ndarray:
+    """What the likelihood compares, the mean over spacings."""
+    setting = DropSetting(Projectile("hemisphere", radius, mass), speed, Material(p_m=p_m), after_stop=0.16)
+    runs = [simulate(setting.replace(spacing=radius / FELT_CELLS * factor)) for factor in FELT_SPACINGS]
+    return np.asarray(np.mean([encode_speeds(run) for run in runs], axis=0))
+
+
+def find_force(code: np.ndarray) -> np.ndarray:
+    return bin_force(lambda time: decode_speed(code, time), math.exp(code[1]))
 
 
 def main() -> None:
@@ -70,7 +75,11 @@ def main() -> None:
                 lambda t, run=run: np.interp(t, run.time, run.speed), run.stopping_time
             )
         peak = reference[16.0].max()
-        rows.setdefault("mesh, 20 cells", []).append((reference[20.0] - reference[16.0]) / peak)
+
+        def keep(name: str, force: np.ndarray, reference=reference[16.0], peak=peak) -> None:
+            rows.setdefault(name, []).append((force - reference) / peak)
+
+        keep("mesh, 20 cells", reference[20.0])
         for cells in CELLS:
             own = simulate(
                 DropSetting(
@@ -78,10 +87,9 @@ def main() -> None:
                 )
             )
             plain = bin_force(lambda t, own=own: np.interp(t, own.time, own.velocity), own.stopping_time)
-            code = encode_speeds(own)
-            kept = bin_force(lambda t, code=code: decode_speed(code, t), own.stopping_time)
-            rows.setdefault(f"labsim, {cells} spacings", []).append((plain - reference[16.0]) / peak)
-            rows.setdefault(f"its code, {cells} spacings", []).append((kept - reference[16.0]) / peak)
+            keep(f"labsim, {cells} spacings", plain)
+            keep(f"its code, {cells} spacings", find_force(encode_speeds(own)))
+        keep("the mean of two codes", find_force(simulate_codes(radius, mass, speed, p_m)))
     print("| beside the mesh of 16 cells | rms, % of the peak | of the mean over the drops | correlation after "
           + ", ".join(map(str, LAGS)) + " stretches |\n|---|---|---|---|")  # fmt: skip
     for name, each in rows.items():
@@ -95,41 +103,16 @@ def main() -> None:
         )
 
 
-def compare_interpolated() -> None:
-    """What a fit sees, by depth."""
+def compare_by_depth() -> None:
     radius, heavier = PROJECTILE
     mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * radius**3 * heavier
-    speeds = own_speeds(SPEEDS)
-    strengths = [strength_node(0.5 * k) for k in range(-1, 5)]
-    codes = np.array(
-        [
-            [
-                encode_speeds(
-                    simulate(
-                        DropSetting(
-                            Projectile("hemisphere", radius, mass),
-                            speed,
-                            Material(p_m=p_m),
-                            spacing=radius / FELT_CELLS,
-                            after_stop=0.16,
-                        )
-                    )
-                )
-                for p_m in strengths
-            ]
-            for speed in speeds
-        ]
-    )
     depths, off = [], []
-    for p_m, speed in product(BETWEEN, SPEEDS):
+    for p_m, speed in product(SOME, SPEEDS):
         run = mesh.run_drop(mesh.Dust(p_m=p_m), radius, speed, mesh.Numerics(cells=12.0), mass=mass)
         reference = bin_force(lambda t, run=run: np.interp(t, run.time, run.speed), run.stopping_time)
-        by_strength = smooth_weights(np.log(strengths), math.log(p_m))
-        by_speed = interpolation_weights(np.log(speeds), math.log(speed))
-        code = np.einsum("i,j,ijk->k", by_speed, by_strength, codes)
-        seen = bin_force(lambda t, code=code: decode_speed(code, t), math.exp(code[1]))
+        code = simulate_codes(radius, mass, speed, p_m)
         depths.append(math.exp(code[0]) / radius)
-        off.append(100 * (seen - reference) / reference.max())
+        off.append(100 * (find_force(code) - reference) / reference.max())
     print(
         "\n| depth, tip radii | drops | rms, % of the peak | mean at tenths of the stop, % |\n|---|---|---|---|"
     )
@@ -146,4 +129,4 @@ def compare_interpolated() -> None:
 
 if __name__ == "__main__":
     main()
-    compare_interpolated()
+    compare_by_depth()
