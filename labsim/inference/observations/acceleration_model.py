@@ -31,7 +31,7 @@ from ..observe_acceleration import BINS, ObservedImpact
 # the power -ROUGHER. The first is without memory; the second, over SHAPE_LENGTH of the stop, is alike in drops that go alike
 # deep. With the most evidence over campaigns of a Lagrangian mesh (benchmarks/acceleration_sizes.py) the first is 0.0032 and the
 # second 0.0075, but then a law without a name gains from what is rough in single campaigns.
-FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0040, 0.0090, 0.125
+FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0045, 0.010, 0.125
 FORCE_REACH = 0.28  # e-folds of depth over tip radius in which the second changes
 USUAL_DEPTH, ROUGHER = 0.8, 1.0
 SHORT = 0.05  # of a stretch, over which a slope is taken
