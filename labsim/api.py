@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # pragma: no cover
 
 
 def track(
-    source: Path | str | Drop | npt.NDArray[Any],
+    source: Path | str | Drop | npt.NDArray[np.generic],
     *,
     frame_rate: float | None = None,
     pixel_size: float | None = None,
@@ -90,7 +90,7 @@ def track(
 
 
 def reduce_scan(
-    source: Path | str | Scan | npt.NDArray[Any],
+    source: Path | str | Scan | npt.NDArray[np.generic],
     *,
     voxel: float | None = None,
     first_slice: str | None = None,
@@ -155,13 +155,33 @@ def reduce_scan(
         return ct.reduce_scan(slices, **settings)
 
 
+@overload
+def simulate(
+    setting: DropSetting,
+    *,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> DropRun: ...
+
+
+@overload
+def simulate(
+    setting: Sequence[DropSetting],
+    *,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> list[DropRun]: ...
+
+
 def simulate(
     setting: DropSetting | Sequence[DropSetting],
     *,
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-) -> Any:
+) -> DropRun | list[DropRun]:
     """Simulate one drop, or many at once; what the store holds is read, not run.
 
     setting : labsim.DropSetting. store : folder of the stored runs (default: LABSIM_STORE or the user's cache). workers :
@@ -256,7 +276,7 @@ def write_report(
     return folder
 
 
-def summarise(found: Any) -> str:
+def summarise(found: object) -> str:
     """A record or a result in words: of a calibration or a diagnosis what the command prints, of a record its own summary.
 
     Raises TypeError for what is neither.
@@ -273,7 +293,7 @@ def summarise(found: Any) -> str:
     return said
 
 
-def plot(found: Any, ax: Axes | None = None) -> Axes:
+def plot(found: object, ax: Axes | None = None) -> Axes:
     """Draw a record or a result on matplotlib axes.
 
     Parameters
@@ -330,7 +350,7 @@ def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> 
     return draw(found, figure)
 
 
-def tabulate(thing: Any) -> pd.DataFrame:
+def tabulate(thing: object) -> pd.DataFrame:
     """A pandas table, one line a frame, instant, threshold or draw; its columns are those of the CSV files, with units.
 
     Parameters
@@ -394,7 +414,7 @@ def _on_disk(source: Any, what: str) -> Iterator[Any]:
         yield path
 
 
-def _find_posterior(found: Any) -> Posterior | None:
+def _find_posterior(found: object) -> Posterior | None:
     """Of a calibration or diagnosis: with the cause, where one is found."""
     found = getattr(found, "calibration", found)  # of published figures
     return getattr(found, "posterior_extended", None) or getattr(found, "posterior", None)
