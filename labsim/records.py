@@ -131,13 +131,14 @@ class Camera:
 
 @dataclass(frozen=True)
 class Sensor:
-    """One sensor of an accelerometer. sigma (of a sample), offset_sigma, range : m/s²; scale_sigma : relative."""
+    """One sensor of an accelerometer. sigma (of a sample), offset_sigma, range, zero : m/s²; scale_sigma : relative."""
 
     column: str
     sigma: float
     offset_sigma: float
     scale_sigma: float
     range: float  # readings beyond it mean nothing; inf where none is stated
+    zero: float = 0.0  # what it reads too much, where its own record shows it
 
 
 @dataclass(frozen=True)

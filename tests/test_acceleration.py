@@ -123,6 +123,40 @@ def test_a_sensor_of_little_noise_may_have_its_zero_off(tmp_path: Path, zero: fl
     assert impact.stopping_time == pytest.approx(stop, rel=0.05)
 
 
+@pytest.mark.parametrize(("zero", "slow"), [(-7.0, False), (4.0, False), (60.0, True)])
+def test_a_zero_that_is_not_known_is_what_the_flight_reads(tmp_path: Path, zero: float, slow: bool) -> None:
+    """As of piezoelectric sensors, by several g; also where gravity is felt before the release for most of the record."""
+    folder = make(tmp_path, rate=4e3 if slow else 20e3)
+    known = look(read_campaign(folder))
+    file = folder / "drops" / "D01" / "acceleration.csv"
+    time, felt = np.loadtxt(file, delimiter=",", skiprows=1).T
+    accelerations.write_record(file.parent, time, felt + zero)
+    with pytest.raises(LabsimError):
+        look(read_campaign(folder))
+    edit(folder, "offset_sigma = 0.05", "offset_sigma = 5.0")
+    edit(folder, "reads_at_rest = 1.0", "reads_at_rest = 0.0")
+    campaign = read_campaign(folder)
+    found = look(campaign)
+    assert campaign.drops[0].accelerometer.sensors[0].offset_sigma < 0.05 * 9.81
+    assert found.warnings == ()
+    assert found.contact_time == pytest.approx(known.contact_time, abs=known.stopping_time * 0.01)
+    assert found.flight_speed.value == pytest.approx(known.flight_speed.value, rel=0.01)
+    assert found.penetration_depth.value == pytest.approx(known.penetration_depth.value, rel=0.02)
+    assert abs(found.flight.value) < 0.05 * 9.81
+    assert found.rest.value == pytest.approx(9.81, abs=0.05 * 9.81)
+
+
+def test_a_zero_that_is_not_known_takes_a_flight(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    edit(folder, "offset_sigma = 0.05", "offset_sigma = 5.0")
+    file = folder / "drops" / "D01" / "acceleration.csv"
+    time, felt = np.loadtxt(file, delimiter=",", skiprows=1).T
+    late = time > time[np.argmax(felt)] - 2e-4
+    accelerations.write_record(file.parent, time[late], felt[late])
+    with pytest.raises(CampaignError, match="shows no free flight before the impact"):
+        read_campaign(folder)
+
+
 def test_the_depth_has_the_error_that_scale_and_zero_leave(tmp_path: Path) -> None:
     """Forty records with a scale and a zero of their own: the depths scatter as they say, within a factor of two."""
     pulls = []

@@ -32,7 +32,9 @@ LOST = 1.5  # sampling intervals: a longer one is a gap
 FLIGHT = 5  # samples of rest and of flight that a release takes
 RELEASE = 10.0  # ln of the odds
 BENT = 0.05  # of the rise to half the largest reading: what a line through it misses contact by, for the force of a tip bends
-REST = 0.5  # of gravity: a level that is further off is no offset but another unit, sign or rest
+# of gravity: a level that is further off is no offset but another unit, sign or rest; a zero known less well is not known
+REST = 0.5
+SAME = 0.25  # of gravity: within it levels are one
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,8 @@ def _each(
 def check_acceleration(path: Path, accelerometer: Accelerometer) -> Accelerometer:
     """See that a record can be read and holds an impact, before anything is computed.
 
-    Returns the accelerometer with the ranges that the file states where drop.toml states none. Raises CampaignError.
+    Returns the accelerometer with the ranges that the file states where drop.toml states none, and with the zeros that the
+    flight shows where they are not known. Raises CampaignError.
     """
     try:
         found = _read(path, accelerometer)
@@ -157,6 +160,8 @@ def check_acceleration(path: Path, accelerometer: Accelerometer) -> Acceleromete
         sensors = tuple(replace(accelerometer.sensors[k], range=ranges[k]) for k in order)
         accelerometer = replace(accelerometer, sensors=sensors)
         found = Readings(found.time, found.values[:, order], tuple(found.ranges[k] for k in order))
+        if any(each.offset_sigma > REST * STANDARD_GRAVITY for each in sensors):
+            accelerometer = _set_zeros(path, accelerometer, found)
         find_contact(_select(path, accelerometer, found), accelerometer, path)
     except MeasurementError as trouble:
         raise CampaignError(trouble.where, trouble.key, trouble.message) from None
@@ -218,7 +223,7 @@ def _select(path: Path, accelerometer: Accelerometer, found: Readings) -> Accele
     for k, each in enumerate(accelerometer.sensors):
         good = np.isfinite(readings[:, k]) & (np.abs(readings[:, k]) < NEAR_RANGE * each.range) & (sensor < 0)
         sensor[good] = k
-        felt[good] = readings[good, k]
+        felt[good] = readings[good, k] - each.zero
     use = sensor >= 0
     if use.sum() < FEWEST:
         raise MeasurementError(
@@ -229,6 +234,40 @@ def _select(path: Path, accelerometer: Accelerometer, found: Readings) -> Accele
     felt += STANDARD_GRAVITY - accelerometer.reads_at_rest
     lost = int(np.sum(np.maximum(np.round(steps / step) - 1, 0))) + int(np.sum(~use & ~beyond))
     return Acceleration(time[use], felt[use], sigma[sensor[use]], sensor[use], step, int(beyond.sum()), lost)
+
+
+def _set_zeros(path: Path, accelerometer: Accelerometer, found: Readings) -> Accelerometer:
+    """With the zero of each sensor whose own is not known, so that in flight it feels nothing. Raises MeasurementError."""
+    sensors = []
+    for each, values in zip(accelerometer.sensors, found.values.T, strict=True):
+        if each.offset_sigma > REST * STANDARD_GRAVITY:
+            level = _find_flight(path, each, values[np.isfinite(values)])
+            zero = level.value + STANDARD_GRAVITY - accelerometer.reads_at_rest
+            each = replace(each, zero=zero, offset_sigma=level.sigma)
+        sensors.append(each)
+    return replace(accelerometer, sensors=tuple(sensors))
+
+
+def _find_flight(path: Path, sensor: Sensor, values: FloatArray) -> Measured:
+    """What a sensor reads (m/s²) in the last spell at the lowest level before the impact: held, it would read gravity more."""
+    peak = int(np.argmax(np.abs(values - np.median(values)))) if values.size else 0
+    if peak >= 2 * FLIGHT:
+        means = np.convolve(values[:peak], np.full(FLIGHT, 1 / FLIGHT), "valid")
+        lowest = int(np.argmin(means))
+        near = (
+            np.abs(means - means[lowest]) < SEEN * sensor.sigma / math.sqrt(FLIGHT) + SAME * STANDARD_GRAVITY
+        )
+        last = int(np.nonzero(near)[0][-1])
+        begin = last - int(np.argmin(near[last::-1])) + 1 if not near[: last + 1].all() else 0
+        # the last mean may hold the first sample of the impact
+        spell = values[begin : last + FLIGHT - 1]
+        if spell.size >= FLIGHT:
+            return Measured(float(np.median(spell)), 1.25 * sensor.sigma / math.sqrt(spell.size))
+    raise MeasurementError(
+        path,
+        sensor.column,
+        "shows no free flight before the impact, and offset_sigma says that its zero is not known; let the record begin earlier",
+    )
 
 
 def find_contact(record: Acceleration, accelerometer: Accelerometer, path: Path) -> int:
