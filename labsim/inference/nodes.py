@@ -61,8 +61,8 @@ def amplitude_nodes(
     step = parameter.step
     unit = parameter.grade(step)
     place = parameter.grade(amplitude) / unit
+    sign = 1.0 if place >= 0.0 else -1.0  # a null over a negative step is -0.0
     # of the numerics, much finer runs would cost more than they say
-    sign = math.copysign(1.0, place)
     if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
         wanted = [sign]
     else:

@@ -112,6 +112,15 @@ def test_a_factor_beside_rough_runs_lies_within_a_third_of_the_next(factor):
     assert simulated[above] / simulated[above - 1] < 1.34
 
 
+def test_a_fingerprint_lies_at_the_step_whatever_its_sign():
+    weaker = Parameter("factor", "1", 1.0, (0.1, 6.0), LogNormal(1.0, 0.5), -0.25, "of a strength")
+    for parameter in (weaker, FACTOR):
+        effect = SimpleNamespace(amplitudes=(parameter,), kind="material")
+        assert amplitude_nodes(effect, 0.0) == pytest.approx([parameter.step])
+        nodes = amplitude_nodes(effect, 0.0, bent=True)
+        assert all(node * parameter.step > 0.0 for node in nodes)
+
+
 @pytest.mark.parametrize(
     ("speeds", "count"),
     [([0.3], 2), ([0.3, 0.31], 2), ([0.23, 0.314, 0.487], 3), ([0.2, 0.21, 0.4, 0.401], 2)],
