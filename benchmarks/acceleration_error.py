@@ -42,7 +42,7 @@ LAGS = (1, 2, 4, 8)  # stretches
 # by depth: radius (m), mass over a bead's; speeds (m/s) and p_m (Pa)
 PROJECTILE = (0.75e-3, 1.0)
 SPEEDS = (0.22, 0.26, 0.31, 0.36, 0.43, 0.52, 0.62, 0.74)
-SOME = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2400.0)
+P_M = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2400.0)
 BANDS = (0.4, 0.55, 0.75, 1.0, 1.3, 2.2)  # of depth over tip radius
 
 
@@ -104,10 +104,11 @@ def main() -> None:
 
 
 def compare_by_depth() -> None:
+    """The mean of two codes beside the mesh, by how deep the tip goes."""
     radius, heavier = PROJECTILE
     mass = mesh.BEAD_DENSITY * 4 / 3 * math.pi * radius**3 * heavier
     depths, off = [], []
-    for p_m, speed in product(SOME, SPEEDS):
+    for p_m, speed in product(P_M, SPEEDS):
         run = mesh.run_drop(mesh.Dust(p_m=p_m), radius, speed, mesh.Numerics(cells=12.0), mass=mass)
         reference = bin_force(lambda t, run=run: np.interp(t, run.time, run.speed), run.stopping_time)
         code = simulate_codes(radius, mass, speed, p_m)

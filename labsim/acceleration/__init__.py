@@ -258,7 +258,7 @@ def _find_flight(path: Path, sensor: Sensor, values: FloatArray) -> Measured:
             np.abs(means - means[lowest]) < SEEN * sensor.sigma / math.sqrt(FLIGHT) + SAME * STANDARD_GRAVITY
         )
         last = int(np.nonzero(near)[0][-1])
-        begin = last - int(np.argmin(near[last::-1])) + 1 if not near[: last + 1].all() else 0
+        begin = int(np.nonzero(~near[:last])[0].max(initial=-1)) + 1
         # the last mean may hold the first sample of the impact
         spell = values[begin : last + FLIGHT - 1]
         if spell.size >= FLIGHT:

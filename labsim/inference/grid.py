@@ -64,10 +64,9 @@ class Family:
     pushed: bool = False
     felt: bool = False
 
-    @property
-    def spacings(self) -> tuple[float, ...]:
-        """Factors on the usual spacing of which there is a run each."""
-        return FELT_SPACINGS if self.felt else (1.0,)
+    def spacings(self, cells: int | None) -> tuple[float, ...]:
+        """Factors on the usual spacing of which there is a run each; fingerprints (``cells``) have one."""
+        return FELT_SPACINGS if self.felt and cells is None else (1.0,)
 
 
 @dataclass(frozen=True)
@@ -258,14 +257,13 @@ class RunGrid:
         for request, number in missing:
             family = self.families[number]
             positions = range(len(family.speeds)) if request.cells is None else family.few
-            spacings = family.spacings if request.cells is None else (1.0,)
+            spacings = family.spacings(request.cells)
             for position, factor in product(positions, spacings):
                 setting = self.setting(
                     family, family.speeds[position], strength_node(request.index), request.cells
                 )
                 setting = request.change(setting) if request.change is not None else setting
-                if factor != 1.0:
-                    setting = setting.replace(spacing=factor * setting.spacing)
+                setting = setting.replace(spacing=factor * setting.spacing)
                 settings.append(hasten(setting) if family.pushed else setting)
                 parts.append(Push if family.pushed else Compaction if family.is_scan else Motion)
             places.append((request, number, len(positions) * len(spacings)))

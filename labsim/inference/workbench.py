@@ -97,7 +97,7 @@ class Workbench:
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of one family, (speeds, m), means over spacings, for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
-        alike = len(self.families[number].spacings) if cells is None else 1
+        alike = len(self.families[number].spacings(cells))
 
         def encode(each: RunFeatures) -> FloatArray | None:
             if runs is None:
