@@ -146,12 +146,13 @@ def test_a_zero_that_is_not_known_is_what_the_flight_reads(tmp_path: Path, zero:
     assert found.rest.value == pytest.approx(9.81, abs=0.05 * 9.81)
 
 
-def test_a_zero_that_is_not_known_takes_a_flight(tmp_path: Path) -> None:
+@pytest.mark.parametrize("before", [2e-4, 1e-3])
+def test_a_zero_that_is_not_known_takes_a_flight(tmp_path: Path, before: float) -> None:
     folder = make(tmp_path)
     edit(folder, "offset_sigma = 0.05", "offset_sigma = 5.0")
     file = folder / "drops" / "D01" / "acceleration.csv"
     time, felt = np.loadtxt(file, delimiter=",", skiprows=1).T
-    late = time > time[np.argmax(felt)] - 2e-4
+    late = time > time[np.argmax(felt)] - before
     accelerations.write_record(file.parent, time[late], felt[late])
     with pytest.raises(CampaignError, match="shows no free flight before the impact"):
         read_campaign(folder)

@@ -250,7 +250,8 @@ def _set_zeros(path: Path, accelerometer: Accelerometer, found: Readings) -> Acc
 
 def _find_flight(path: Path, sensor: Sensor, values: FloatArray) -> Measured:
     """What a sensor reads (m/s²) in the last spell at the lowest level before the impact: held, it would read gravity more."""
-    peak = int(np.argmax(np.abs(values - np.median(values)))) if values.size else 0
+    usual = float(np.median(values)) if values.size else 0.0
+    peak = int(np.argmax(np.abs(values - usual))) if values.size else 0
     if peak >= 2 * FLIGHT:
         means = np.convolve(values[:peak], np.full(FLIGHT, 1 / FLIGHT), "valid")
         lowest = int(np.argmin(means))
@@ -261,8 +262,10 @@ def _find_flight(path: Path, sensor: Sensor, values: FloatArray) -> Measured:
         begin = int(np.nonzero(~near[:last])[0].max(initial=-1)) + 1
         # the last mean may hold the first sample of the impact
         spell = values[begin : last + FLIGHT - 1]
-        if spell.size >= FLIGHT:
-            return Measured(float(np.median(spell)), 1.25 * sensor.sigma / math.sqrt(spell.size))
+        level = float(np.median(spell)) if spell.size >= FLIGHT else math.inf
+        # a record that begins within the impact is lowest in the rise
+        if abs(level - usual) < 0.5 * abs(values[peak] - usual):
+            return Measured(level, 1.25 * sensor.sigma / math.sqrt(spell.size))
     raise MeasurementError(
         path,
         sensor.column,
