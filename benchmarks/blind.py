@@ -162,12 +162,12 @@ def main() -> None:
     parser.add_argument("--store", type=Path, default=None)
     options = parser.parse_args()
     only = {name for name in options.only.split(",") if name}
-    names = sorted(path.parent.name for path in options.folder.glob("*/campaign.toml"))
-    rows = []
+    names = {path.parent.name for path in options.folder.glob("*/campaign.toml")}
     truths = options.folder / "truth.json"
-    for name in names:
-        if only and name not in only:
-            continue
+    if only - names or not truths.exists():
+        parser.error(f"{options.folder} has no {', '.join(sorted(only - names)) or truths.name}")
+    rows = []
+    for name in sorted(only or names):
         began = time.perf_counter()
         found = diagnose_campaign(
             read_campaign(options.folder / name), RunStore(options.store), workers=options.workers

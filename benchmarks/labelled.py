@@ -139,7 +139,11 @@ def make_campaigns(
     planned = tomllib.loads(arguments.plan.read_text())["campaign"]
     for k, hidden in enumerate(planned):
         hidden.setdefault("name", f"{letter}{k + 1:02d}")
-    chosen = [h for h in planned if not arguments.only or h["name"] in arguments.only.split(",")]
+    asked = [name for name in arguments.only.split(",") if name]
+    unplanned = set(asked) - {h["name"] for h in planned}
+    if unplanned:
+        parser.error(f"{arguments.plan} plans no {', '.join(sorted(unplanned))}")
+    chosen = [h for h in planned if not asked or h["name"] in asked]
     arguments.out.mkdir(parents=True, exist_ok=True)
     truth_file = arguments.out / "truth.json"
     truth = json.loads(truth_file.read_text()) if truth_file.exists() else {}
