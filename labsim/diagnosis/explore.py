@@ -87,7 +87,7 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
 def _start_at(bench: Workbench, nominal: Fit, name: str, log_p_m: float) -> float:
     """Amplitude that the data ask for at a strength, by the tangent there, within two of its steps."""
     parameter = bench.effects[name].amplitudes[0]
-    bench.require_about(name, log_p_m)
+    bench.require_fingerprints([name], log_p_m, f"{name} at another p_m")
     blocks = with_probes(bench, nominal, [name], log_p_m)
     step, *_ = solve_globals(blocks, [name], {name: (0.0, parameter.scale)})
     reach = 2 * abs(parameter.step)

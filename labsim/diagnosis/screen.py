@@ -17,7 +17,6 @@ import numpy as np
 from ..inference.blocks import whiten_all
 from ..inference.evidence import integrate_linear, log_share_inside
 from ..inference.fitting import Fit, with_probes
-from ..inference.nodes import amplitude_nodes, screening_node
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 
@@ -62,15 +61,12 @@ class Screening:
 def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str] | None = None) -> Screening:
     """Tangents of all effects at the nominal fit (runs at one amplitude and one p_m each) and their scores."""
     names = [name for name in (names or bench.effects) if bench.effects[name].amplitudes]
-    index = screening_node(fit.log_p_m)
-    wanted = [
-        (name, amplitude, index)
-        for name in names
-        if bench.costs_runs(name)
-        for amplitude in amplitude_nodes(bench.effects[name], 0.0)
-    ]
-    bench.require_changes(wanted, "what each cause changes", coarse=True)
-    names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
+    simulated = [name for name in names if bench.costs_runs(name)]
+    bench.require_fingerprints(simulated, fit.log_p_m, "what each cause changes")
+    failed = [name for name in simulated if not has_runs(bench, name)]
+    for name in failed:
+        bench.reasons[name] = f"is not judged: its runs fail at a p_m near {math.exp(fit.log_p_m):.3g} Pa"
+    names = [name for name in names if name not in failed]
     whitened = whiten_all(with_probes(bench, fit, names), ["ln_p_m", *names])
     sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))
     direction = whitened[:, 1] * sigma

@@ -52,16 +52,23 @@ def screening_node(log_p_m: float) -> int:
 
 
 def amplitude_nodes(
-    effect: Effect, amplitude: float, *, coarse: bool = False, around: bool = False, bent: bool = False
+    effect: Effect,
+    amplitude: float,
+    *,
+    coarse: bool = False,
+    around: bool = False,
+    bent: bool = False,
+    side: float = 1.0,
 ) -> list[float]:
-    """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits;
-    ``around``: one more beyond them, so that the curve between two does not depend on the side that the estimate came from;
-    ``bent``: between nodes a quarter of the step apart, half of it beyond the first; ``coarse``: with few of them."""
+    """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits.
+
+    side : 1 or -1, of the step, at a null. ``around``: one more beyond them, so that the curve between two does not depend on
+    the side that the estimate came from; ``bent``: between nodes a quarter of the step apart, half of it beyond the first; ``coarse``: with few of them."""
     parameter = effect.amplitudes[0]
     step = parameter.step
     unit = parameter.grade(step)
     place = parameter.grade(amplitude) / unit
-    sign = 1.0 if place >= 0.0 else -1.0  # a null over a negative step is -0.0
+    sign = math.copysign(1.0, place) if place != 0.0 else side  # a null over a negative step is -0.0
     # of the numerics, much finer runs would cost more than they say
     if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
         wanted = [sign]

@@ -189,6 +189,13 @@ class Workbench:
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
         cells = COARSE_CELLS if coarse and self.grid.cells > COARSE_CELLS else None
+        if cells is not None:
+            if self.felt:  # what numerics do at a coarser spacing is more than they do at that of fits
+                fine = [each for each in wanted if self.effects[each[0]].kind == "numerics"]
+                self.require_changes(fine, text)
+            # no fingerprint is looked at where there are changes
+            known = {name for each in self.features for name in each.table.changes}
+            wanted = [each for each in wanted if each[0] not in known]
         plain = [Request("", None, index, cells) for index in sorted({index for _, _, index in wanted})]
         changed = [
             Request(self._variant(name, a), self.change(name, a), index, cells) for name, a, index in wanted
@@ -198,12 +205,27 @@ class Workbench:
             for name, amplitude, index in wanted:
                 self._fill_change(number, index, name, amplitude, cells)
 
-    def require_about(self, name: str, log_p_m: float) -> None:
-        """The base about a strength and a fingerprint of one effect there."""
+    def require_fingerprints(self, names: Sequence[str], log_p_m: float, text: str) -> None:
+        """The base about a strength, and what each effect changes there by one step; by a step to the other side of its null
+        where a run of the first never stopped: a heavy projectile falls through weak dust."""
         self.require_base_about(log_p_m)
         index = screening_node(log_p_m)
-        wanted = [(name, amplitude, index) for amplitude in amplitude_nodes(self.effects[name], 0.0)]
-        self.require_changes(wanted, f"{name} at another p_m", coarse=True)
+        for side in (1.0, -1.0):
+            lacking = [name for name in names if not self._has_change(name, index)]
+            wanted = [
+                (name, amplitude, index)
+                for name in lacking
+                for amplitude in amplitude_nodes(self.effects[name], 0.0, side=side)
+            ]
+            if wanted:
+                self.require_changes(wanted, text, coarse=True)
+
+    def _has_change(self, name: str, index: float) -> bool:
+        """Whether an effect has runs of its own, or every projectile a fingerprint of it at a strength node."""
+        return all(
+            name in each.table.changes or each.table.fingerprints.get(name, {}).get(index)
+            for each in self.features
+        )
 
     def initial_setting(self, amplitudes: Mapping[str, float], name: str) -> DropSetting:
         """What would be simulated at the place of a drop or scan, for data that need no run: its initial state counts.

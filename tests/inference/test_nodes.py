@@ -1,12 +1,13 @@
 """Nodes of p_m and amplitudes, and the curves through what is known at them."""
 
 import math
-from types import SimpleNamespace
+from types import MethodType, SimpleNamespace
 
 import numpy as np
 import pytest
 
 from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, list_effects
+from labsim.inference.forward import ResponseTable
 from labsim.inference.grid import (
     FELT_STEPS,
     SAME_SPEED,
@@ -16,6 +17,7 @@ from labsim.inference.grid import (
     strength_node,
 )
 from labsim.inference.nodes import amplitude_nodes, nodes_around
+from labsim.inference.workbench import Workbench
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 7])
@@ -117,8 +119,37 @@ def test_a_fingerprint_lies_at_the_step_whatever_its_sign():
     for parameter in (weaker, FACTOR):
         effect = SimpleNamespace(amplitudes=(parameter,), kind="material")
         assert amplitude_nodes(effect, 0.0) == pytest.approx([parameter.step])
+        (other,) = amplitude_nodes(effect, 0.0, side=-1.0)
+        assert other * parameter.step < 0.0
         nodes = amplitude_nodes(effect, 0.0, bent=True)
         assert all(node * parameter.step > 0.0 for node in nodes)
+
+
+def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
+    """A heavy projectile fell through dust of a third of the shear strength, and the verdict did not know of this cause."""
+    tables = [ResponseTable(np.log([0.3, 0.4]), (0, 1)) for _ in range(2)]
+    asked = []
+
+    def require_changes(wanted, text, *, coarse):
+        for name, amplitude, index in wanted:
+            asked.append((name, np.sign(amplitude)))
+            for k, table in enumerate(tables):
+                entry = table.fingerprints.setdefault(name, {}).setdefault(index, {})
+                if name == "tensile_strength" or amplitude > 0.0 or k == 0:
+                    entry[amplitude] = np.zeros((2, 3))
+
+    bench = SimpleNamespace(
+        effects=list_effects(None),
+        features=[SimpleNamespace(table=table) for table in tables],
+        require_base_about=lambda log_p_m: None,
+        require_changes=require_changes,
+    )
+    bench._has_change = MethodType(Workbench._has_change, bench)
+    Workbench.require_fingerprints(bench, ["shear_strength", "tensile_strength"], math.log(340.0), "causes")
+    steps = {n: np.sign(bench.effects[n].amplitudes[0].step) for n in ("shear_strength", "tensile_strength")}
+    assert steps["shear_strength"] < 0.0
+    assert asked == [*steps.items(), ("shear_strength", 1.0)]
+    assert all(any(table.fingerprints["shear_strength"].values()) for table in tables)
 
 
 @pytest.mark.parametrize(
