@@ -62,8 +62,10 @@ def amplitude_nodes(
 ) -> list[float]:
     """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits.
 
-    side : 1 or -1, of the step, at a null. ``around``: one more beyond them, so that the curve between two does not depend on
-    the side that the estimate came from; ``bent``: between nodes a quarter of the step apart, half of it beyond the first; ``coarse``: with few of them."""
+    side : 1 or -1, of the step, at a null. around : one more beyond them, so that the curve between two does not depend on the
+    side that the estimate came from. bent : between nodes a quarter of the step apart, half of it beyond the first. coarse :
+    with few of them.
+    """
     parameter = effect.amplitudes[0]
     step = parameter.step
     unit = parameter.grade(step)
