@@ -441,4 +441,9 @@ def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list
 def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:
     reach = 2 * abs(bench.effects[score.name].amplitudes[0].step)
     start = float(np.clip(score.amplitude, -reach, reach))
-    return fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start}))
+    fit = fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start}))
+    if fit.log_likelihood > nominal.log_likelihood:
+        return fit
+    # the best is no less likely than null, which it holds: from a far start the fit has ended at a limit
+    again = fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: 0.0}), nuisances=nominal)
+    return max(fit, again, key=lambda each: each.evidence)

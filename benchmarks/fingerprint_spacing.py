@@ -1,0 +1,73 @@
+"""How alike fingerprints of causes are that come from coarser runs, for drops with an accelerometer.
+
+    python benchmarks/fingerprint_spacing.py [CAMPAIGN] [--workers 2]
+
+A fingerprint is what a cause changes in the data, over their errors, after p_m and all nuisances are taken out. The campaign is
+data/campaigns/f161 where none is named. Of every cause with runs: the cosine between its fingerprint with 6 (or 5) spacings in a
+tip radius and that with 8, and how long it is over that. Last: CPU seconds of the screening, all of it simulated anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from labsim.campaign import read_campaign
+from labsim.diagnosis.screen import screen
+from labsim.inference import grid
+from labsim.inference.calibrate import prepare
+from labsim.inference.runs import RunStore
+from labsim.inference.scatter import set_terms
+from labsim.records import Campaign
+
+CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f161"
+SPACINGS = (8, 6, 5)  # in a tip radius; the first is that of fits
+
+
+def find_fingerprints(campaign: Campaign, spacings: int, workers: int) -> tuple[dict[str, np.ndarray], float]:
+    """Name of a cause -> its fingerprint per step; and CPU seconds."""
+    grid.FELT_COARSE_CELLS = spacings
+    with tempfile.TemporaryDirectory() as folder:
+        bench, nominal = prepare(campaign, RunStore(), workers=workers, terms=set_terms(campaign))
+        bench.grid.store = RunStore(Path(folder))
+        began = time.process_time()
+        found = screen(bench, nominal, np.random.default_rng(1))
+        spent = time.process_time() - began
+    steps = {name: bench.effects[name].amplitudes[0].step for name in found.names}
+    simulated = [
+        name for name in found.names if bench.costs_runs(name) and bench.effects[name].kind != "numerics"
+    ]
+    return {name: steps[name] * found.fingerprints[:, found.names.index(name)] for name in simulated}, spent
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("campaign", type=Path, nargs="?", default=CAMPAIGN)
+    parser.add_argument("--workers", type=int, default=1)
+    given = parser.parse_args()
+    campaign = read_campaign(given.campaign)
+    found = {spacings: find_fingerprints(campaign, spacings, given.workers) for spacings in SPACINGS}
+    finest, *coarser = SPACINGS
+    lengths = {name: float(np.linalg.norm(each)) for name, each in found[finest][0].items()}
+    print("| cause | length | " + " | ".join(f"{n}: cosine | length" for n in coarser) + " |")
+    print("|---" * (2 + 2 * len(coarser)) + "|")
+    for name in sorted(lengths, key=lambda name: -lengths[name]):
+        row = [f"{lengths[name]:.1f}"]
+        for spacings in coarser:
+            there, finer = found[spacings][0][name], found[finest][0][name]
+            length = float(np.linalg.norm(there))
+            row += [f"{there @ finer / (length * lengths[name]):.3f}", f"{length / lengths[name]:.2f}"]
+        print(f"| {name} | " + " | ".join(row) + " |")
+    print(
+        "CPU seconds: " + ", ".join(f"{spent:.0f} with {spacings}" for spacings, (_, spent) in found.items())
+    )
+
+
+if __name__ == "__main__":
+    main()
