@@ -36,3 +36,28 @@ def test_an_effect_far_behind_a_law_without_a_name_is_not_run_finer(monkeypatch,
     found = {fit.hypothesis[0]: fit.evidence for fit in fits}
     # what is not run finer stays as it was explored: the nearest listed cause has a name
     assert found["shear_strength"] == (260.0 if "shear_strength" in finer else 250.0)
+
+
+@pytest.mark.parametrize(("from_null", "kept"), [(-70.0, "null"), (-90.0, "far")])
+def test_a_fit_less_likely_than_its_null_is_made_again_from_there(monkeypatch, from_null, kept):
+    """A bulk modulus ended at a limit of its amplitude, 8 in ln likelihood below the null that it holds."""
+    starts = []
+
+    def fit_hypothesis(bench, hypothesis, start, nuisances=None):
+        starts.append(start[1]["bulk_modulus"])
+        likelihood = -80.0 if len(starts) == 1 else from_null
+        where = "far" if len(starts) == 1 else "null"
+        return SimpleNamespace(log_likelihood=likelihood, evidence=likelihood - 3.0, where=where)
+
+    monkeypatch.setattr(campaign, "fit_hypothesis", fit_hypothesis)
+    bench = SimpleNamespace(
+        effects={"bulk_modulus": SimpleNamespace(amplitudes=[SimpleNamespace(step=10.0)])}
+    )
+    nominal = SimpleNamespace(log_p_m=7.0, log_likelihood=-75.0)
+    score = SimpleNamespace(name="bulk_modulus", amplitude=99.0)
+    assert campaign._fit_from_score(bench, nominal, score).where == kept
+    assert starts == [20.0, 0.0]
+    starts.clear()
+    nominal.log_likelihood = -85.0
+    assert campaign._fit_from_score(bench, nominal, score).where == "far"
+    assert starts == [20.0]
