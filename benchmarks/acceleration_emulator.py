@@ -24,10 +24,10 @@ from labsim.inference.curves import decode_speed
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.observations import RunFeatures
 from labsim.inference.observe_acceleration import BINS, COMPARED
-from labsim.inference.run_parts import Motion
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
 from labsim.inference.workbench import Workbench
+from labsim.runs.parts import Motion
+from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f161"
 P_M = 1640.0  # Pa, between nodes

@@ -16,7 +16,7 @@ import numpy as np
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import calibrate
-from labsim.inference.runs import RunStore
+from labsim.runs.store import RunStore
 
 
 def main() -> None:

@@ -32,10 +32,10 @@ from labsim.inference.blocks import solve_globals
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import Fit, fit_hypothesis
 from labsim.inference.observations import acceleration_model
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
 from labsim.inference.tangents import linearise_at
 from labsim.inference.workbench import Workbench
+from labsim.runs.store import RunStore
 
 SHARES = (0.01, 0.03, 0.1)  # of what a cause changes
 SIZES = ("FORCE_ROUGHNESS", "FORCE_SHAPE", "SHAPE_LENGTH", "FORCE_REACH")

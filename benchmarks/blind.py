@@ -31,7 +31,7 @@ from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.diagnosis.shapes import MARK
 from labsim.inference.fitting import fit_hypothesis
-from labsim.inference.runs import RunStore
+from labsim.runs.store import RunStore
 
 # words of truth.json -> the effect whose first parameter they give
 WORDS = HIDDEN | {

@@ -20,9 +20,9 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
 from labsim.inference import grid
 from labsim.inference.calibrate import prepare
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
 from labsim.records import Campaign
+from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f161"
 SPACINGS = (8, 6, 5)  # in a tip radius; the first is that of fits

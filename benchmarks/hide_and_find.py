@@ -33,11 +33,11 @@ from own_campaigns import MIDDLE, NOT_HIDDEN, SPREAD, judge_hidden, open_campaig
 
 from labsim.diagnosis.screen import CONFUSABLE, screen
 from labsim.inference.calibrate import prepare
-from labsim.inference.runs import RunStore
 from labsim.inference.strength import Found, StrengthCount
 from labsim.inference.synthetic import LABORATORY, QUIET, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign, FloatArray
+from labsim.runs.store import RunStore
 
 DROPS = "D02,D03,D05,D06,D07,D13,D14"  # rods of 0.5 mm and of 1.5 mm radius
 KINDS = ("material", "sample", "contact", "measurement")

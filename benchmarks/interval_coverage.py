@@ -19,11 +19,11 @@ from own_campaigns import append_rows, interval, open_campaign, read_rows
 
 from labsim.inference.calibrate import prepare, sample_fit
 from labsim.inference.fitting import goodness_of_fit
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import allow_scatter
 from labsim.inference.synthetic import LABORATORY, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign
+from labsim.runs.store import RunStore
 
 SPREAD = 0.15  # of ln p_m about 1300 Pa, inside the truth's own nodes
 

@@ -20,9 +20,9 @@ import numpy as np
 from own_campaigns import STANDARD, open_campaign
 
 from labsim.diagnosis.campaign import diagnose_campaign
-from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import LABORATORY, Hidden, TruthTable, measure_hidden
 from labsim.report.law_words import describe_learned
+from labsim.runs.store import RunStore
 
 # name -> place and (x, radius m) -> value in Pa or share
 HIDDEN = {

@@ -36,11 +36,11 @@ from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
-from labsim.inference.runs import RunStore
 from labsim.inference.strength import Found, Search, StrengthCount
 from labsim.inference.synthetic import LABORATORY, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
+from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parent.parent / "data" / "campaigns" / "p01"
 LABELLED_SCANS = CAMPAIGN.parents[1] / "ct" / "labelled_scans"

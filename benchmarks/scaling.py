@@ -16,9 +16,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from labsim.inference.runs import RunStore
-from labsim.inference.workers import warm_up
 from labsim.records import Material, Projectile
+from labsim.runs.store import RunStore
+from labsim.runs.workers import warm_up
 from labsim.sph import DropSetting
 
 

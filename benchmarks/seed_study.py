@@ -23,9 +23,9 @@ import numpy as np
 
 from labsim.effects import list_effects, list_places, reference_campaign
 from labsim.inference.planar import planar_setting
-from labsim.inference.run_file import FailedRun
-from labsim.inference.runs import RunStore
 from labsim.records import Material, Projectile
+from labsim.runs.run_file import FailedRun
+from labsim.runs.store import RunStore
 from labsim.sph import DropRun, DropSetting
 
 TABLE = Path(__file__).parents[1] / "docs" / "seed-study.csv"

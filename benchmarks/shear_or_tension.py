@@ -18,8 +18,8 @@ from labelled import measure_campaigns
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import fit_hypothesis
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
+from labsim.runs.store import RunStore
 
 CAUSES = ("shear_strength", "tensile_strength")
 STARTS = (-0.3, 0.5)  # factors of 0.7 and 1.5: both sides are tried

@@ -26,8 +26,8 @@ from labsim.diagnosis.campaign import Judgement, judge_scatters
 from labsim.inference.calibrate import prepare
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observe_push import ObservedPush
-from labsim.inference.runs import RunStore
 from labsim.records import Campaign, Drop
+from labsim.runs.store import RunStore
 
 CAUSE = ("strength_rate",)
 

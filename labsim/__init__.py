@@ -40,7 +40,7 @@ _PLACES = {
     "Projectile": "records",
     "Camera": "records",
     "DropSetting": "sph",
-    "RunStore": "inference.runs",
+    "RunStore": "runs.store",
 }
 
 __all__ = [

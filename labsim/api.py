@@ -27,9 +27,9 @@ if TYPE_CHECKING:  # pragma: no cover
     from .diagnosis.summary import SummaryDiagnosis
     from .inference.calibrate import Calibration
     from .inference.posterior import Posterior
-    from .inference.runs import RunStore
     from .inference.summary import SummaryCalibration
     from .report.outputs import Axes, Figure
+    from .runs.store import RunStore
     from .sph import DropRun, DropSetting
     from .video.following import Progress
 
@@ -188,7 +188,7 @@ def simulate(
     processes (default: one a core). scheduler : address of a Dask scheduler. Returns a DropRun, or a list in the same order.
     Raises SimulationError for a setting outside the solver's limits or a run that failed.
     """
-    from .inference.runs import require_runs
+    from .runs.store import require_runs
     from .sph import DropSetting, check_setting
 
     single = isinstance(setting, DropSetting)
@@ -429,6 +429,6 @@ def _read(campaign: Campaign | Path | str) -> Campaign:
 
 
 def _open(store: Path | str | None) -> RunStore:
-    from .inference.runs import RunStore
+    from .runs.store import RunStore
 
     return RunStore(store)

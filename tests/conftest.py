@@ -32,7 +32,7 @@ TOGETHER = ("tests/report/",)  # folders whose files share fixtures of the sessi
 def shared_store() -> str:
     """The user's own store (LABSIM_STORE names another): a run is the same whoever asks, so no test makes one that the demo,
     a notebook or the last session has made. Tests of the store itself have stores of their own."""
-    from labsim.inference.runs import default_store
+    from labsim.runs.store import default_store
 
     return str(default_store())
 

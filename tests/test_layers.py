@@ -13,7 +13,7 @@ FLOORS = [
     {"text_files", "extensions", "references"},
     {"tables", "tiff_pages", "tracks", "examples"},
     {"video", "ct", "sph"},  # siblings that never import each other
-    {"own_keys", "calibrated"},
+    {"own_keys", "calibrated", "runs"},
     {"campaign_tables", "repeated_records", "acceleration", "force"},
     {"campaign_scans", "campaign_strength"},
     {"campaign"},

@@ -148,8 +148,8 @@ def write_sound(home: Path) -> None:
     from campaign_files import write_scan_of
 
     from labsim.ct.phantom import Phantom
-    from labsim.inference.runs import RunStore, require_runs
     from labsim.records import Material, Projectile
+    from labsim.runs.store import RunStore, require_runs
     from labsim.sph import DropSetting
     from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 

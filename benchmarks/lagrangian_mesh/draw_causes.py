@@ -27,9 +27,9 @@ from labsim.effects import Effect
 from labsim.errors import LabsimError
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import fit_hypothesis
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import set_terms
 from labsim.records import Campaign
+from labsim.runs.store import RunStore
 
 SIGMAS = 8.0
 CLOSE = 0.15  # of ln of the standard deviations

@@ -21,9 +21,9 @@ from labsim.inference.blocks import Block
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import Fit, fit_hypothesis
 from labsim.inference.observations import compacted_zone
-from labsim.inference.runs import RunStore
 from labsim.inference.tangents import linearise_at
 from labsim.inference.workbench import Workbench
+from labsim.runs.store import RunStore
 
 FLOORS = (0.003, 0.001, 0.0005, 0.0003)  # beside the one that is
 

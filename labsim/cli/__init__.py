@@ -27,7 +27,7 @@ import typer
 
 from .. import __version__
 from ..errors import LabsimError
-from ..inference.processes import silence_numerics
+from ..runs.processes import silence_numerics
 from . import _provenance, options
 
 NOT_COMMANDS = {"options"}  # shared by commands

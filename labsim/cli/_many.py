@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ..errors import LabsimError
-from ..inference.workers import explain_loss, open_executor, wait_for_any
+from ..runs.workers import explain_loss, open_executor, wait_for_any
 from ..text_files import load_json
 from . import _provenance, options
 

@@ -8,9 +8,9 @@ import typer
 
 from ..errors import InferenceError
 from ..inference.planar import READINGS
-from ..inference.runs import RunStore
 from ..inference.summary import SummaryCalibration, calibrate_summary
 from ..records import Campaign
+from ..runs.store import RunStore
 
 Use = Annotated[
     str | None,

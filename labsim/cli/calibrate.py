@@ -12,8 +12,8 @@ from ..effects import list_effects
 from ..effects.model import read_model
 from ..inference.calibrate import Calibration
 from ..inference.calibrate import calibrate as calibrate_drops
-from ..inference.runs import RunStore
 from ..inference.summary import SummaryCalibration
+from ..runs.store import RunStore
 from . import options
 from ._published import (
     PUBLISHED_ONLY,

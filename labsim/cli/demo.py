@@ -12,9 +12,9 @@ from ..campaign import read_campaign
 from ..diagnosis.campaign import Diagnosis, diagnose_campaign
 from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
 from ..examples import example
-from ..inference.runs import RunStore
 from ..inference.summary import calibrate_summary
 from ..results import SAID
+from ..runs.store import RunStore
 from . import _provenance, options
 
 END = "\n\n"  # of what a diagnosis says first: what is wrong, what to do

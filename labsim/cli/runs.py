@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from ..errors import InferenceError
-from ..inference.runs import RunStore
 from ..report.phrases import say_count
+from ..runs.store import RunStore
 from . import options
 
 

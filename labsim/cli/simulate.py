@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from ..inference.run_file import write_run_file
-from ..inference.runs import RunStore, require_runs
+from ..runs.run_file import write_run_file
+from ..runs.store import RunStore, require_runs
 from ..sph import DropRun, check_setting, extrapolate, refine
 from ..sph.setting import base_area, say_motion, say_projectile
 from . import options

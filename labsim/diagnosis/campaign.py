@@ -24,7 +24,6 @@ from ..inference.free_fall import doubt_scales
 from ..inference.measure import Measurements, measure
 from ..inference.observations.drop_terms import Terms
 from ..inference.posterior import Posterior
-from ..inference.runs import Progress, RunStore
 from ..inference.scatter import (
     Scatter,
     ScatterEstimate,
@@ -38,6 +37,7 @@ from ..inference.settle import list_large, settle
 from ..inference.surface_rows import doubt_surface_rows
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
+from ..runs.store import Progress, RunStore
 from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
 from .free_law import fit_hats, is_wanted

@@ -21,11 +21,11 @@ from ..inference.blocks import Block, solve_globals
 from ..inference.evidence import log_share_inside
 from ..inference.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
 from ..inference.nodes import amplitude_nodes, place_strength
-from ..inference.run_parts import Push
 from ..inference.steps import move_nuisances
 from ..inference.tangents import linearise_at
 from ..inference.workbench import Workbench
 from ..records import FloatArray
+from ..runs.parts import Push
 from .hats import FreeLaw, list_laws, make_hats
 from .screen import has_runs
 

@@ -19,9 +19,9 @@ from ..inference.fitting import Hypothesis
 from ..inference.planar import campaign_setting
 from ..inference.published import impact_speed
 from ..inference.readings import Reading
-from ..inference.runs import Progress, RunStore, require_stopped
 from ..inference.summary import COARSE, SummaryCalibration
 from ..records import Drop, FloatArray
+from ..runs.store import Progress, RunStore, require_stopped
 from ..sph import DropRun, DropSetting
 from .judge import Verdict
 from .prediction import Prediction

@@ -16,6 +16,7 @@ from ..effects.model import Model
 from ..errors import InferenceError
 from ..own_keys import DUST
 from ..records import Campaign
+from ..runs.store import Progress, RunStore
 from .error_sizes import integrate_sizes
 from .fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
 from .free_fall import doubt_scales
@@ -24,7 +25,6 @@ from .observations.compacted_zone import observe_scan
 from .observations.drop_terms import Terms
 from .open_workbench import open_workbench
 from .posterior import Posterior, sample
-from .runs import Progress, RunStore
 from .scatter import ScatterEstimate, allow_scatter, estimate_scatter, set_terms
 from .settle import list_large, settle
 from .surface_rows import doubt_surface_rows

@@ -13,6 +13,7 @@ from ..effects.model import Model, apply_effects, check_model
 from ..effects.terms import apply_law
 from ..errors import InferenceError
 from ..records import Campaign, Projectile
+from ..runs.store import Progress, RunStore
 from ..sph import DropSetting
 from .curves import encode_run, encode_speeds
 from .forward import ResponseTable
@@ -38,7 +39,6 @@ from .observations.undisturbed import Layering, UndisturbedDust
 from .observe import Observed, observe_drops
 from .observe_acceleration import ObservedImpact
 from .observe_push import ObservedPush, measure_ground
-from .runs import Progress, RunStore
 from .supported import refuse_others
 from .workbench import Workbench
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from ..errors import InferenceError
 from ..records import FloatArray
+from ..runs.store import Progress
 from .chain import fingerprint, read_chain, write_chain
-from .runs import Progress
 
 REACH = 2.5  # standard deviations at which the residual is measured
 WALKERS_PER_PARAMETER = 16

@@ -19,8 +19,8 @@ import numpy as np
 from ..effects import Effect
 from ..errors import LabsimError
 from ..records import Campaign
+from ..runs.store import RunStore
 from .calibrate import prepare
-from .runs import RunStore
 from .synthetic import QUIET, measure_hidden
 from .truth import Hidden, TruthTable
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..records import Campaign, Drop, FloatArray
+from ..runs.store import Progress, RunStore, require_stopped
 from ..sph import DropRun, DropSetting
 from .emulator import Emulator, fit_emulator
 from .planar import SPACING, campaign_setting
 from .posterior import Posterior, sample
 from .published import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
 from .readings import FigureLikelihood, NumericalError, Reading, integrate_reading, list_readings
-from .runs import Progress, RunStore, require_stopped
 
 REFERENCE_P_M = 1300.0  # Pa, the seed's dynamic value: where the two spacings are compared
 # Pa; the literature on this dust has used the first and the last

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from labsim.cli import list_command_files, main
-from labsim.inference.run_file import read_run_file
+from labsim.runs.run_file import read_run_file
 from labsim.sph import extrapolate
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"

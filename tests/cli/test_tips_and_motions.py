@@ -11,9 +11,9 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.cli import main
 from labsim.errors import CampaignError, InferenceError
-from labsim.inference.run_file import read_run_file
 from labsim.inference.supported import refuse_others
 from labsim.records import Motion
+from labsim.runs.run_file import read_run_file
 from labsim.sph.materials import find_law, list_laws
 from labsim.sph.motions import find_motion, list_motions
 from labsim.sph.plugins import key_of

@@ -14,7 +14,7 @@ from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.judge import NESTED, PRIOR_PAIRS, TEMPERATURE, judge
 from labsim.inference.blocks import Block
 from labsim.inference.fitting import Fit
-from labsim.inference.runs import RunStore
+from labsim.runs.store import RunStore
 
 CAMPAIGNS = Path(__file__).parents[2] / "data" / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text())

@@ -23,8 +23,8 @@ from labsim.effects.terms import combine
 from labsim.inference.blocks import Block, solve_globals
 from labsim.inference.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
-from labsim.inference.runs import RunStore
 from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.runs.store import RunStore
 from labsim.sph import DropSetting
 from labsim.sph.sirono import tabulate_strengths
 

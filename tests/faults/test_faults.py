@@ -22,9 +22,9 @@ import pytest
 from attempts import list_children
 
 from labsim.errors import InferenceError
-from labsim.inference.run_file import HEAD, make_key, read_run_file, write_run_file
-from labsim.inference.runs import RunStore, require_runs
 from labsim.records import Material, Projectile
+from labsim.runs.run_file import HEAD, make_key, read_run_file, write_run_file
+from labsim.runs.store import RunStore, require_runs
 from labsim.sph import DropRun, DropSetting
 
 SOFT = Material(bulk_modulus=4500.0)

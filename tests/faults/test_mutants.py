@@ -25,8 +25,8 @@ from small_campaign import copy_campaign
 import labsim
 from labsim.ct.phantom import Phantom
 from labsim.effects import list_effects
-from labsim.inference.runs import RunStore, require_runs
 from labsim.records import Material, Projectile
+from labsim.runs.store import RunStore, require_runs
 from labsim.sph import DropSetting
 from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 

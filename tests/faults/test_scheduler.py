@@ -17,10 +17,10 @@ from small_campaign import ROOT, add_videos_and_scans, copy_campaign
 
 from labsim.cli._compare import compare_folders
 from labsim.errors import InferenceError
-from labsim.inference import workers
-from labsim.inference.runs import RunStore, require_runs
-from labsim.inference.workers import run_with_solver
 from labsim.records import Material, Projectile
+from labsim.runs import workers
+from labsim.runs.store import RunStore, require_runs
+from labsim.runs.workers import run_with_solver
 from labsim.sph import DropSetting
 
 pytest.importorskip("distributed")

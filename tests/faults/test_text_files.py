@@ -107,7 +107,7 @@ def test_a_hostile_summary_is_one_line(tmp_path: Path, content: str) -> None:
 
 
 def test_a_hostile_list_of_runs_is_not_read(tmp_path: Path) -> None:
-    from labsim.inference.runs import RunStore
+    from labsim.runs.store import RunStore
 
     for hostile in ("[" * NESTED, "9" * 5000, '{"a": 1}'):
         (tmp_path / "index.json").write_text(hostile)

@@ -15,7 +15,7 @@ import small_sweep
 from attempts import list_children
 from small_campaign import ROOT
 
-from labsim.inference.processes import ProcessWorkers
+from labsim.runs.processes import ProcessWorkers
 
 LONG = 1 << 20  # bytes of a result, many buffers of a pipe
 

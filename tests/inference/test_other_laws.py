@@ -9,9 +9,9 @@ import numpy as np
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import calibrate
-from labsim.inference.runs import RunStore
 from labsim.records import Material, Projectile
 from labsim.report.campaign_tables import campaign_calibration_lines, campaign_calibration_summary
+from labsim.runs.store import RunStore
 from labsim.sph import DropSetting, simulate
 
 COHESION = 2000.0  # Pa, hidden

@@ -20,7 +20,7 @@ from labsim.inference.grid import INERTIA, hasten, set_nominal_drop, set_push
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observations.push_model import encode_push
 from labsim.inference.observe_push import ObservedPush, measure_ground
-from labsim.inference.runs import RunStore
+from labsim.runs.store import RunStore
 from labsim.sph import simulate
 from labsim.sph.materials import find_law
 

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from labsim.errors import InferenceError, SimulationError
-from labsim.inference import run_file
 from labsim.inference.curves import encode_run
-from labsim.inference.run_file import FailedRun, canonical, make_key, read_run_file, write_run_file
-from labsim.inference.run_parts import Compaction, Motion
-from labsim.inference.runs import RunStore, require_runs
 from labsim.records import Material, Projectile
+from labsim.runs import run_file
+from labsim.runs.parts import Compaction, Motion
+from labsim.runs.run_file import FailedRun, canonical, make_key, read_run_file, write_run_file
+from labsim.runs.store import RunStore, require_runs
 from labsim.sph import DropRun, DropSetting, Numerics
 
 SOFT = Material(bulk_modulus=4500.0)

@@ -14,8 +14,8 @@ from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
 from labsim.inference.fitting import goodness_of_fit
 from labsim.inference.measure import measure
-from labsim.inference.runs import RunStore
 from labsim.inference.scatter import WIDTH, allow_scatter, find_larger, find_scatter, set_terms, weigh_least
+from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
 DROPS, POINTS = 15, 6

@@ -24,11 +24,11 @@ from labsim.inference.observations.sleeve_friction import (
     measure_spread,
 )
 from labsim.inference.observe_push import ObservedPush
-from labsim.inference.run_parts import Push
-from labsim.inference.runs import RunStore
 from labsim.inference.supported import refuse_others
 from labsim.inspection.drops import inspect_drop
 from labsim.records import Campaign, Material, Sleeve
+from labsim.runs.parts import Push
+from labsim.runs.store import RunStore
 from labsim.sph import simulate
 
 TILLER = Path(__file__).resolve().parents[2] / "data/campaigns/tiller"

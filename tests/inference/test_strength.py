@@ -10,10 +10,10 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.inference import strength
-from labsim.inference.runs import RunStore
 from labsim.inference.strength import StrengthCount, hide
 from labsim.inference.synthetic import QUIET, measure_hidden
 from labsim.inference.truth import Hidden, TruthTable
+from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
 

@@ -14,9 +14,9 @@ from labsim.effects import list_effects
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observations.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.inference.open_workbench import open_workbench
-from labsim.inference.runs import RunStore
 from labsim.inference.tangents import linearise_alone
 from labsim.records import Scan
+from labsim.runs.store import RunStore
 
 DEPTH = np.arange(1.6e-4, 3.3e-3, 8e-5)
 NOISE = 1.5e-4

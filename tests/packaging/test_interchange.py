@@ -11,7 +11,7 @@ import pytest
 
 import labsim
 from labsim.inference.posterior import sample
-from labsim.inference.run_file import write_run_file
+from labsim.runs.run_file import write_run_file
 
 
 def test_a_posterior_opens_with_arviz(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from campaign_files import CAMPAIGN, DROP, fill_in, write_scan_of
 
 from labsim.ct.phantom import Phantom
-from labsim.inference.runs import RunStore
+from labsim.runs.store import RunStore
 from labsim.sph import DropRun, DropSetting
 from labsim.sph.run import Particles
 

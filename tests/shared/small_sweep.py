@@ -12,7 +12,7 @@ import sys
 import threading
 from concurrent.futures import FIRST_COMPLETED, wait
 
-from labsim.inference.workers import open_executor
+from labsim.runs.workers import open_executor
 
 
 def make(size: int, number: int, deadly: int, delay: float) -> bytes:

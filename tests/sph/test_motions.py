@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from labsim.errors import SimulationError
-from labsim.inference.run_file import make_key, read_run_file, say_setting, write_run_file
 from labsim.records import Material, Motion, Projectile
+from labsim.runs.run_file import make_key, read_run_file, say_setting, write_run_file
 from labsim.sph import DropSetting, check_setting, simulate
 from labsim.sph.bodies import elastic_material
 from labsim.sph.motions import list_motions, make_path

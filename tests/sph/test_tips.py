@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial import KDTree
 
 from labsim.errors import SimulationError
-from labsim.inference.run_file import canonical, make_key
 from labsim.records import Material, Projectile
+from labsim.runs.run_file import canonical, make_key
 from labsim.sph import DropSetting, check_setting
 from labsim.sph import particles as rows
 from labsim.sph.bodies import elastic_material, set_body

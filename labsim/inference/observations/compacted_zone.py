@@ -21,10 +21,10 @@ from ...ct.project import project
 from ...ct.reduce import ReducedScan
 from ...effects import Instrument
 from ...records import FillingMap, FloatArray, Scan
+from ...runs.parts import Compaction
 from ...sph import DropRun
 from ..blocks import Block, lay_out
 from ..forward import ResponseTable
-from ..run_parts import Compaction
 from . import RunFeatures
 from .drop_terms import Probe, Terms, measure_distances
 from .undisturbed import GREY, observe_undisturbed

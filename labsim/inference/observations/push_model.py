@@ -16,10 +16,10 @@ import numpy as np
 
 from ...effects import Instrument
 from ...records import FloatArray
+from ...runs.parts import Push
 from ...sph import DropRun
 from ..forward import Instant, ResponseTable
 from ..observe_push import Ground, ObservedPush
-from ..run_parts import Push
 from .drop_model import REACH
 
 PROFILE = 3.0  # of ln strength in each window, prior width: as good as free

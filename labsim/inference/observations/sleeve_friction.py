@@ -20,10 +20,10 @@ import numpy as np
 
 from ...effects import Instrument
 from ...records import FloatArray
+from ...runs.parts import Push
 from ...sph import DropRun
 from ..blocks import Block, add_errors, lay_out
 from ..observe_push import ObservedPush
-from ..run_parts import Push
 from . import RunFeatures, WithoutNuisances
 from .drop_terms import Probe, Terms
 

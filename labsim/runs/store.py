@@ -26,6 +26,7 @@ from ..sph import DropRun, DropSetting, simulate
 from ..sph._jit import is_compiled
 from ..sph.materials import is_current
 from ..text_files import load_json
+from .parts import AnyPart, Part
 from .run_file import (
     DAMAGE,
     FailedRun,
@@ -37,7 +38,6 @@ from .run_file import (
     say_setting,
     write_run_file,
 )
-from .run_parts import AnyPart, Part
 from .workers import explain_loss, open_executor, wait_for_any
 
 Progress = Callable[[float, float, str], None]  # work done, all work (in any unit), what is done

@@ -27,7 +27,7 @@ from ..errors import InferenceError, LabsimError
 from ..sph import DropRun, DropSetting, solver_hash
 from ..sph.setting import say_material, say_motion, say_projectile
 from ..sph.tips import make_profile
-from .run_parts import AnyPart, Part
+from .parts import AnyPart, Part
 
 FORMAT = 1  # of the stored files; part of the key
 HEAD = 512  # bytes before the HDF5 part, the smallest user block there is
