@@ -20,10 +20,10 @@ from acceleration_error import bin_force
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
-from labsim.inference.curves import decode_speed
-from labsim.inference.fitting import fit_hypothesis
+from labsim.inference.emulation.curves import decode_speed
+from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.observations import RunFeatures
-from labsim.inference.observe_acceleration import BINS, COMPARED
+from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.inference.scatter import set_terms
 from labsim.inference.workbench import Workbench
 from labsim.runs.parts import Motion

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labsim.inference.curves import decode_speed, encode_speeds
-from labsim.inference.grid import FELT_CELLS, FELT_SPACINGS
-from labsim.inference.observe_acceleration import BINS, COMPARED
+from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.grid import FELT_CELLS, FELT_SPACINGS
+from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
 

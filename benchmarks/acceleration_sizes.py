@@ -28,12 +28,12 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
 from labsim.diagnosis.shapes import lay_out_shapes
 from labsim.diagnosis.unknown import fit_unknown
-from labsim.inference.blocks import solve_globals
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import Fit, fit_hypothesis
+from labsim.inference.fits.blocks import solve_globals
+from labsim.inference.fits.fitting import Fit, fit_hypothesis
+from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations import acceleration_model
 from labsim.inference.scatter import set_terms
-from labsim.inference.tangents import linearise_at
 from labsim.inference.workbench import Workbench
 from labsim.runs.store import RunStore
 

@@ -30,7 +30,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.diagnosis.shapes import MARK
-from labsim.inference.fitting import fit_hypothesis
+from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.runs.store import RunStore
 
 # words of truth.json -> the effect whose first parameter they give

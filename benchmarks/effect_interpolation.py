@@ -20,10 +20,10 @@ from effect_roughness import CAMPAIGN, SPEEDS, lay_out
 
 from labsim.campaign import read_campaign
 from labsim.effects import list_effects
-from labsim.inference.curves import decode_speed, encode_speeds
-from labsim.inference.grid import FELT_CELLS, FELT_STEPS, smooth_weights
-from labsim.inference.nodes import amplitude_nodes
-from labsim.inference.observe_acceleration import BINS, COMPARED
+from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.grid import FELT_CELLS, FELT_STEPS, smooth_weights
+from labsim.inference.emulation.nodes import amplitude_nodes
+from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.sph import simulate
 
 EFFECTS = (

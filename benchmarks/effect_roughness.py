@@ -22,8 +22,8 @@ import numpy as np
 
 from labsim.campaign import read_campaign
 from labsim.effects import list_effects, list_places
-from labsim.inference.curves import decode_speed, encode_speeds
-from labsim.inference.observe_acceleration import BINS, COMPARED
+from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
 

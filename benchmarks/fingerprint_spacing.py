@@ -18,8 +18,8 @@ import numpy as np
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
-from labsim.inference import grid
 from labsim.inference.calibrate import prepare
+from labsim.inference.emulation import grid
 from labsim.inference.scatter import set_terms
 from labsim.records import Campaign
 from labsim.runs.store import RunStore

@@ -2,8 +2,8 @@
 
     python benchmarks/interval_coverage.py OUT [--campaigns 60] [--samples 0.02] [--workers 2]
 
-Every campaign has 15 drops of four projectiles and two maps, with every nuisance that labsim.inference.synthetic knows, and a p_m
-of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. Prints coverage and the goodness of fit.
+Every campaign has 15 drops of four projectiles and two maps, with every nuisance that labsim.inference.truths.synthetic knows,
+and a p_m of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. Prints coverage and the goodness of fit.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import pandas as pd
 from own_campaigns import append_rows, interval, open_campaign, read_rows
 
 from labsim.inference.calibrate import prepare, sample_fit
-from labsim.inference.fitting import goodness_of_fit
+from labsim.inference.fits.fitting import goodness_of_fit
 from labsim.inference.scatter import allow_scatter
-from labsim.inference.synthetic import LABORATORY, measure_hidden
-from labsim.inference.truth import Hidden, TruthTable
+from labsim.inference.truths.synthetic import LABORATORY, measure_hidden
+from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.records import Campaign
 from labsim.runs.store import RunStore
 

@@ -20,7 +20,7 @@ import numpy as np
 from own_campaigns import STANDARD, open_campaign
 
 from labsim.diagnosis.campaign import diagnose_campaign
-from labsim.inference.synthetic import LABORATORY, Hidden, TruthTable, measure_hidden
+from labsim.inference.truths.synthetic import LABORATORY, Hidden, TruthTable, measure_hidden
 from labsim.report.law_words import describe_learned
 from labsim.runs.store import RunStore
 

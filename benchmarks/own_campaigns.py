@@ -6,8 +6,8 @@
 Writes OUT/strengths.json, what is hidden, and OUT/rows.jsonl, one line a campaign; a second call goes on where the first
 stopped. Prints false alarms and coverage on the nulls, exact and class hit rates per strength, p_m coverage with the extension, a
 reliability table of the probabilities. --plan stops after the strengths. The strength of an effect is what the best nominal fit
-leaves of it in a campaign without noise (labsim.inference.strength), in standard deviations; every draw takes the other side of
-null where it has two. OMP_NUM_THREADS=1 keeps the workers out of each other's way.
+leaves of it in a campaign without noise (labsim.inference.truths.strength), in standard deviations; every draw takes the other
+side of null where it has two. OMP_NUM_THREADS=1 keeps the workers out of each other's way.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from labsim.diagnosis.campaign import judge_scatters
 from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import goodness_of_fit
-from labsim.inference.strength import Found, Search, StrengthCount
-from labsim.inference.synthetic import LABORATORY, measure_hidden
-from labsim.inference.truth import Hidden, TruthTable
+from labsim.inference.fits.fitting import goodness_of_fit
+from labsim.inference.truths.strength import Found, Search, StrengthCount
+from labsim.inference.truths.synthetic import LABORATORY, measure_hidden
+from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 from labsim.runs.store import RunStore
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from labsim.effects import list_effects, list_places, reference_campaign
-from labsim.inference.planar import planar_setting
+from labsim.inference.published.planar import planar_setting
 from labsim.records import Material, Projectile
 from labsim.runs.run_file import FailedRun
 from labsim.runs.store import RunStore

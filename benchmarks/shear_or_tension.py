@@ -17,7 +17,7 @@ from labelled import measure_campaigns
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import fit_hypothesis
+from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.scatter import set_terms
 from labsim.runs.store import RunStore
 

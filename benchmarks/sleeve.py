@@ -20,7 +20,7 @@ import numpy as np
 from cone_factor import START, push_cone
 from flat_punch import RADIUS
 
-from labsim.inference.grid import hasten, set_push
+from labsim.inference.emulation.grid import hasten, set_push
 from labsim.inference.observations.push_model import encode_push
 from labsim.inference.observations.sleeve_friction import encode_sleeve
 from labsim.records import Material, Projectile

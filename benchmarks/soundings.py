@@ -25,7 +25,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Judgement, judge_scatters
 from labsim.inference.calibrate import prepare
 from labsim.inference.measure import Measurements, measure
-from labsim.inference.observe_push import ObservedPush
+from labsim.inference.observations.observe_push import ObservedPush
 from labsim.records import Campaign, Drop
 from labsim.runs.store import RunStore
 

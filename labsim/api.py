@@ -26,8 +26,8 @@ if TYPE_CHECKING:  # pragma: no cover
     from .diagnosis.campaign import Diagnosis
     from .diagnosis.summary import SummaryDiagnosis
     from .inference.calibrate import Calibration
-    from .inference.posterior import Posterior
-    from .inference.summary import SummaryCalibration
+    from .inference.fits.posterior import Posterior
+    from .inference.published.calibrate import SummaryCalibration
     from .report.outputs import Axes, Figure
     from .runs.store import RunStore
     from .sph import DropRun, DropSetting
@@ -209,14 +209,14 @@ def calibrate(
     """The posterior of p_m (Pa), and of effects named in ``parameters``.
 
     settings : workers, scheduler, seed, progress, and what ``labsim.inference.calibrate.calibrate`` takes for tracks and
-    ``labsim.inference.summary.calibrate_summary`` for published figures. Raises LabsimError.
+    ``labsim.inference.published.calibrate.calibrate_summary`` for published figures. Raises LabsimError.
     """
     read = _read(campaign)
     if read.has_records:
         from .inference.calibrate import calibrate as calibrate_tracks
 
         return calibrate_tracks(read, parameters, store=_open(store), **settings)
-    from .inference.summary import calibrate_summary
+    from .inference.published.calibrate import calibrate_summary
 
     return calibrate_summary(read, _open(store), **settings)
 
@@ -235,7 +235,7 @@ def diagnose(
 
         return diagnose_campaign(read, opened, **settings)
     from .diagnosis.summary import diagnose_summary
-    from .inference.summary import calibrate_summary
+    from .inference.published.calibrate import calibrate_summary
 
     return diagnose_summary(calibrate_summary(read, opened, **settings), opened, **settings)
 

@@ -15,7 +15,7 @@ from campaign_files import CAMPAIGN, DROP, SCAN
 from labsim.campaign import describe_campaign, read_campaign, read_drop, read_scan
 from labsim.cli import main
 from labsim.errors import CampaignError, MeasurementError
-from labsim.inference.observe import read_observed_track
+from labsim.inference.observations.observe import read_observed_track
 from labsim.records import PublishedScan, Scan
 
 SEED = Path(__file__).parent.parent / "data" / "guettler2009"

@@ -16,7 +16,7 @@ from labsim.campaign import read_campaign
 from labsim.cli import main
 from labsim.cli import new as new_command
 from labsim.errors import CampaignError
-from labsim.inference.observe import observe_drops
+from labsim.inference.observations.observe import observe_drops
 from labsim.inference.surface_rows import doubt_surface_rows
 
 P01 = Path(__file__).parents[1] / "data" / "campaigns" / "p01"

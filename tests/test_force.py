@@ -14,7 +14,7 @@ import pytest
 from labsim.campaign import read_campaign, read_drop
 from labsim.errors import CampaignError, LabsimError, MeasurementError
 from labsim.force import check_force, read_force, read_gauge
-from labsim.inference.observe_push import observe_push
+from labsim.inference.observations.observe_push import observe_push
 from labsim.inspection.drops import find_air
 from labsim.tables import Table
 

@@ -18,8 +18,8 @@ from labsim.cli import main
 from labsim.diagnosis.campaign import judge_scatters
 from labsim.errors import CampaignError, InferenceError
 from labsim.inference.calibrate import calibrate, prepare
+from labsim.inference.fits.tangents import linearise_alone
 from labsim.inference.observations.static_tests import StaticTests, fit_softness, fit_strength
-from labsim.inference.tangents import linearise_alone
 from labsim.records import Material
 
 KINDS = ("compression_omnidirectional", "compression_unidirectional", "tension", "shear")

@@ -26,7 +26,7 @@ from labsim.diagnosis.screen import screen
 from labsim.effects import Effect
 from labsim.errors import LabsimError
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import fit_hypothesis
+from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.scatter import set_terms
 from labsim.records import Campaign
 from labsim.runs.store import RunStore

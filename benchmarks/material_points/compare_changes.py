@@ -22,8 +22,8 @@ import pandas as pd
 
 from labsim.campaign import read_campaign
 from labsim.effects import Effect, list_effects
-from labsim.inference.blocks import Block
-from labsim.inference.grid import DEFAULT_CELLS, set_nominal_drop
+from labsim.inference.emulation.grid import DEFAULT_CELLS, set_nominal_drop
+from labsim.inference.fits.blocks import Block
 from labsim.inference.observations.drop_terms import USUAL_DEPTH, NumericalError, Terms
 from labsim.inference.observations.tracks import numerical_covariance
 from labsim.sph import DropSetting, simulate

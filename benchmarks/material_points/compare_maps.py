@@ -17,11 +17,11 @@ from pathlib import Path
 from compare_changes import read_hidden
 
 from labsim.campaign import read_campaign
-from labsim.inference.blocks import Block
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import Fit, fit_hypothesis
+from labsim.inference.fits.blocks import Block
+from labsim.inference.fits.fitting import Fit, fit_hypothesis
+from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations import compacted_zone
-from labsim.inference.tangents import linearise_at
 from labsim.inference.workbench import Workbench
 from labsim.runs.store import RunStore
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InferenceError
-from ..inference.planar import READINGS
-from ..inference.summary import SummaryCalibration, calibrate_summary
+from ..inference.published.calibrate import SummaryCalibration, calibrate_summary
+from ..inference.published.planar import READINGS
 from ..records import Campaign
 from ..runs.store import RunStore
 

@@ -22,8 +22,8 @@ from ..effects import (
 from ..effects.model import apply_material
 from ..effects.terms import apply_law
 from ..errors import CampaignError, LabsimError
-from ..inference.planar import planar_setting
-from ..inference.published import impact_speed
+from ..inference.published.figures import impact_speed
+from ..inference.published.planar import planar_setting
 from ..own_keys import DUST, find_name, read_motion, read_own, set_law
 from ..records import STANDARD_GRAVITY, Campaign, Drop, Material, Motion, Projectile
 from ..sph import DropSetting

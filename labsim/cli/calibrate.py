@@ -12,7 +12,7 @@ from ..effects import list_effects
 from ..effects.model import read_model
 from ..inference.calibrate import Calibration
 from ..inference.calibrate import calibrate as calibrate_drops
-from ..inference.summary import SummaryCalibration
+from ..inference.published.calibrate import SummaryCalibration
 from ..runs.store import RunStore
 from . import options
 from ._published import (

@@ -12,7 +12,7 @@ from ..campaign import read_campaign
 from ..diagnosis.campaign import Diagnosis, diagnose_campaign
 from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
 from ..examples import example
-from ..inference.summary import calibrate_summary
+from ..inference.published.calibrate import calibrate_summary
 from ..results import SAID
 from ..runs.store import RunStore
 from . import _provenance, options

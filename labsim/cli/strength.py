@@ -27,7 +27,7 @@ def strength(
     as_json: options.AsJson = False,
 ) -> None:
     """Fit the curves of static compression, tension and shear tests, and compare them with the drops' p_m."""
-    from ..inference.fitting import REJECTED
+    from ..inference.fits.fitting import REJECTED
     from ..inference.observations.drop_terms import Terms
     from ..inference.observations.static_tests import PARAMETERS, fit_softness, fit_strength
     from ..report.strength_figures import draw_strength

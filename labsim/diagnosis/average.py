@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.stats import truncnorm
 
-from ..inference.fitting import Fit, Hypothesis
+from ..inference.fits.fitting import Fit, Hypothesis
 from ..records import FloatArray
 from .judge import Verdict
 

@@ -19,11 +19,12 @@ from ..inference.calibrate import (
     warn_unsettled,
     warn_unused_scans,
 )
-from ..inference.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
+from ..inference.fits.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
+from ..inference.fits.posterior import Posterior
+from ..inference.fits.settle import list_large, settle
 from ..inference.free_fall import doubt_scales
 from ..inference.measure import Measurements, measure
 from ..inference.observations.drop_terms import Terms
-from ..inference.posterior import Posterior
 from ..inference.scatter import (
     Scatter,
     ScatterEstimate,
@@ -33,7 +34,6 @@ from ..inference.scatter import (
     set_terms,
     weigh_least,
 )
-from ..inference.settle import list_large, settle
 from ..inference.surface_rows import doubt_surface_rows
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray

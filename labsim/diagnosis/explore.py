@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..inference.blocks import solve_globals
-from ..inference.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, goodness_of_fit, with_probes
+from ..inference.fits.blocks import solve_globals
+from ..inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, goodness_of_fit, with_probes
 from ..inference.workbench import Workbench
 from .screen import Screening
 from .shapes import cause

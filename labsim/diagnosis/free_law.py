@@ -17,12 +17,12 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import truncnorm
 
-from ..inference.blocks import Block, solve_globals
-from ..inference.evidence import log_share_inside
-from ..inference.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
-from ..inference.nodes import amplitude_nodes, place_strength
-from ..inference.steps import move_nuisances
-from ..inference.tangents import linearise_at
+from ..inference.emulation.nodes import amplitude_nodes, place_strength
+from ..inference.fits.blocks import Block, solve_globals
+from ..inference.fits.evidence import log_share_inside
+from ..inference.fits.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
+from ..inference.fits.steps import move_nuisances
+from ..inference.fits.tangents import linearise_at
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from ..runs.parts import Push

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
-from ..inference.fitting import Fit
+from ..inference.fits.fitting import Fit
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..effects import Effect, Normal, Parameter
 from ..effects.contract import ChangeSetting
 from ..effects.terms import Knots, add_table
-from ..inference.fitting import Fit
+from ..inference.fits.fitting import Fit
 from ..inference.observations.compacted_zone import CompactedZones
 from ..inference.observations.tracks import Tracks
 from ..inference.workbench import Workbench

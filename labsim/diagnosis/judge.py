@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.fitting import Fit, Hypothesis
+from ..inference.fits.fitting import Fit, Hypothesis
 
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1

@@ -19,7 +19,7 @@ import numpy as np
 from ..effects import Effect, Normal, Parameter
 from ..effects.terms import KNOTS, Term, add_term, list_terms
 from ..errors import LabsimError
-from ..inference.fitting import Fit, fit_hypothesis
+from ..inference.fits.fitting import Fit, fit_hypothesis
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from ..sph import DropSetting

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..inference.blocks import Block
-from ..inference.fitting import DOUBTFUL, Fit, rate_block
+from ..inference.fits.blocks import Block
+from ..inference.fits.fitting import DOUBTFUL, Fit, rate_block
 from ..inference.observations.compacted_zone import CompactedZone, CompactedZones
 from ..inference.workbench import Workbench
 from ..records import FloatArray

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibrated import read_value
-from ..inference.curves import FRACTIONS
-from ..inference.fitting import Fit
-from ..inference.observe import ObservedDrop
+from ..inference.emulation.curves import FRACTIONS
+from ..inference.fits.fitting import Fit
+from ..inference.observations.observe import ObservedDrop
 from ..inference.workbench import Workbench
 from ..records import STANDARD_GRAVITY, FloatArray
 

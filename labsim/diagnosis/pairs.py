@@ -9,8 +9,8 @@ from contextlib import suppress
 import numpy as np
 
 from ..errors import ExtrapolationError
-from ..inference.fitting import Fit, Hypothesis, fit_hypothesis
-from ..inference.settle import list_large, settle
+from ..inference.fits.fitting import Fit, Hypothesis, fit_hypothesis
+from ..inference.fits.settle import list_large, settle
 from ..inference.workbench import Workbench
 from .screen import CLOSE, Screening, screen, screen_pairs
 

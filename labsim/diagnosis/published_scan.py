@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.stats import norm
 
-from ..inference.emulator import fit_emulator
+from ..inference.published.emulator import fit_emulator
 from ..records import FloatArray, PublishedScan
 from ..sph import DropRun
 from .prediction import Prediction

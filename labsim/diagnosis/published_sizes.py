@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.emulator import Emulator, fit_emulator
-from ..inference.planar import round_depth
-from ..inference.published import FIGURE_KINDS, impact_speed, published_figure
-from ..inference.summary import SummaryCalibration
+from ..inference.published.calibrate import SummaryCalibration
+from ..inference.published.emulator import Emulator, fit_emulator
+from ..inference.published.figures import FIGURE_KINDS, impact_speed, published_figure
+from ..inference.published.planar import round_depth
 from ..records import Drop, FloatArray
 from ..sph import DropRun
 from .prediction import Prediction

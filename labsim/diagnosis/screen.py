@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..inference.blocks import whiten_all
-from ..inference.evidence import integrate_linear, log_share_inside
-from ..inference.fitting import Fit, with_probes
+from ..inference.fits.blocks import whiten_all
+from ..inference.fits.evidence import integrate_linear, log_share_inside
+from ..inference.fits.fitting import Fit, with_probes
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 

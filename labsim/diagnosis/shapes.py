@@ -15,9 +15,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..effects import Effect, Parameter
-from ..inference.blocks import solve_globals
-from ..inference.fitting import Fit
-from ..inference.tangents import linearise_alone
+from ..inference.fits.blocks import solve_globals
+from ..inference.fits.fitting import Fit
+from ..inference.fits.tangents import linearise_alone
 from ..inference.workbench import Workbench
 from .screen import Screening
 

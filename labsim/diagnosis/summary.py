@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..inference.fitting import Hypothesis
-from ..inference.planar import campaign_setting
-from ..inference.published import impact_speed
-from ..inference.readings import Reading
-from ..inference.summary import COARSE, SummaryCalibration
+from ..inference.fits.fitting import Hypothesis
+from ..inference.published.calibrate import COARSE, SummaryCalibration
+from ..inference.published.figures import impact_speed
+from ..inference.published.planar import campaign_setting
+from ..inference.published.readings import Reading
 from ..records import Drop, FloatArray
 from ..runs.store import Progress, RunStore, require_stopped
 from ..sph import DropRun, DropSetting

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..inference.readings import Reading
-from ..inference.summary import SummaryCalibration
+from ..inference.published.calibrate import SummaryCalibration
+from ..inference.published.readings import Reading
 from .prediction import Prediction
 from .published_sizes import SizeScaling
 

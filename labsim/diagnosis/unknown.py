@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..inference.blocks import Block, solve_globals
-from ..inference.evidence import log_share_inside
-from ..inference.fitting import Fit
+from ..inference.fits.blocks import Block, solve_globals
+from ..inference.fits.evidence import log_share_inside
+from ..inference.fits.fitting import Fit
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate

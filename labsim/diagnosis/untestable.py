@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibrated import show_parameter
-from ..inference.blocks import whiten_all
-from ..inference.fitting import Fit, with_probes
+from ..inference.fits.blocks import whiten_all
+from ..inference.fits.fitting import Fit, with_probes
 from ..inference.workbench import Workbench
 from .screen import has_runs
 from .shapes import cause

@@ -17,18 +17,18 @@ from ..errors import InferenceError
 from ..own_keys import DUST
 from ..records import Campaign
 from ..runs.store import Progress, RunStore
-from .error_sizes import integrate_sizes
-from .fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
+from .fits.error_sizes import integrate_sizes
+from .fits.fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
+from .fits.posterior import Posterior, sample
+from .fits.settle import list_large, settle
+from .fits.target import make_target
 from .free_fall import doubt_scales
 from .measure import Measurements, measure
 from .observations.compacted_zone import observe_scan
 from .observations.drop_terms import Terms
 from .open_workbench import open_workbench
-from .posterior import Posterior, sample
 from .scatter import ScatterEstimate, allow_scatter, estimate_scatter, set_terms
-from .settle import list_large, settle
 from .surface_rows import doubt_surface_rows
-from .target import make_target
 from .workbench import Workbench
 
 LEANS = 2.0  # standard errors of ln p_m from an end of its range: one in twenty of the Gaussian is cut off from there on

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..records import STANDARD_GRAVITY, Measured
-from .observe import Observed
+from .observations.observe import Observed
 
 STRAY = 4.0  # standard deviations from the middle of all drops: that drop's own fault
 SMALL_SHARE = 0.01  # relative: what is smaller is not worth a word

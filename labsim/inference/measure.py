@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from ..ct.reduce import ReducedScan, reduce_scan
 from ..errors import MeasurementError
 from ..records import Campaign
+from .observations.observe import Observed, observe_drops
 from .observations.undisturbed import UndisturbedDust, observe_undisturbed
-from .observe import Observed, observe_drops
 
 
 @dataclass

@@ -15,9 +15,9 @@ from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..runs.store import Progress, RunStore
 from ..sph import DropSetting
-from .curves import encode_run, encode_speeds
-from .forward import ResponseTable
-from .grid import (
+from .emulation.curves import encode_run, encode_speeds
+from .emulation.forward import ResponseTable
+from .emulation.grid import (
     FELT_STEPS,
     PUSH_RATIO,
     SPEED_RATIO,
@@ -32,13 +32,13 @@ from .observations.acceleration_model import make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
 from .observations.drop_model import make_drop_model
 from .observations.drop_terms import RecordModel, Terms
+from .observations.observe import Observed, observe_drops
+from .observations.observe_acceleration import ObservedImpact
+from .observations.observe_push import ObservedPush, measure_ground
 from .observations.push_model import PushModel, encode_push
 from .observations.sleeve_friction import SleeveFriction, TipSleeves, encode_sleeve, measure_spread
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
-from .observe import Observed, observe_drops
-from .observe_acceleration import ObservedImpact
-from .observe_push import ObservedPush, measure_ground
 from .supported import refuse_others
 from .workbench import Workbench
 

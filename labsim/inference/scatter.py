@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular
 from scipy.stats import halfnorm
 
 from ..records import Campaign, FloatArray
-from .fitting import Fit, fit_hypothesis
+from .fits.fitting import Fit, fit_hypothesis
 from .observations.drop_terms import Terms
 from .workbench import Workbench
 

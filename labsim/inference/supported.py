@@ -9,8 +9,8 @@ from ..calibrated import find_limits, find_parameter
 from ..errors import InferenceError
 from ..own_keys import DUST
 from ..records import Campaign, Motion
-from .grid import strength_node
-from .nodes import enclosing_nodes
+from .emulation.grid import strength_node
+from .emulation.nodes import enclosing_nodes
 
 # laws whose friction ratio keeps to observations.sleeve_friction.SOLVER where the spacing is refined (benchmarks/sleeve.py)
 SHAFTS = ("von_mises",)

@@ -14,7 +14,7 @@ from dataclasses import replace
 from ..own_keys import ROUND
 from ..records import STANDARD_GRAVITY, DecelerationCurve, Drop, Track
 from ..video.contact_row import find_surface_row
-from .observe import Observed, ObservedDrop
+from .observations.observe import Observed, ObservedDrop
 
 DOUBTED = 4.0  # standard deviations
 SCALE_SHARE = 0.01  # by which apparent gravity may be off before the pixel size is taken from it

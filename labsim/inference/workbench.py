@@ -13,21 +13,21 @@ from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
 from ..records import Campaign, FloatArray
 from ..sph import DropSetting
-from .forward import ResponseTable
-from .grid import (
+from .emulation.forward import ResponseTable
+from .emulation.grid import (
     COARSE_CELLS,
     Change,
     Family,
     Request,
     RunGrid,
 )
-from .nodes import amplitude_nodes, enclosing_nodes, screening_node
+from .emulation.nodes import amplitude_nodes, enclosing_nodes, screening_node
 from .observations import Observation, RunFeatures
 from .observations.compacted_zone import CompactedZone, CompactedZones
 from .observations.drop_terms import Terms
+from .observations.observe import Observed
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
-from .observe import Observed
 
 
 @dataclass

@@ -9,8 +9,8 @@ import numpy as np
 from ..acceleration import SEEN, find_impact, read_acceleration
 from ..errors import LabsimError
 from ..force import ForceRecord, read_force
-from ..inference.observe import read_observed_track
-from ..inference.observe_push import observe_push
+from ..inference.observations.observe import read_observed_track
+from ..inference.observations.observe_push import observe_push
 from ..inference.surface_rows import doubt_surface_row
 from ..records import STANDARD_GRAVITY, Campaign, DecelerationCurve, Drop, Measured, Track
 from ..video import open_frames

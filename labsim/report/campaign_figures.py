@@ -15,7 +15,7 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle
 
 from ..diagnosis.campaign import Diagnosis
-from ..inference.posterior import Posterior
+from ..inference.fits.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import FloatArray
 from .drop_views import DropView

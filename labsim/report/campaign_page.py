@@ -9,8 +9,8 @@ from typing import Any
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion
 from ..inference.calibrate import Calibration
-from ..inference.fitting import DOUBTFUL
-from ..inference.posterior import Posterior
+from ..inference.fits.fitting import DOUBTFUL
+from ..inference.fits.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import Campaign
 from .campaign_figures import choose_decisive

@@ -18,8 +18,8 @@ from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
-from ..inference.posterior import Posterior
-from ..inference.summary import summarise
+from ..inference.fits.posterior import Posterior
+from ..inference.published.calibrate import summarise
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from ..sph import solver_hash

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..inference.fitting import Fit
-from ..inference.observe import Observed, ObservedDrop
-from ..inference.observe_acceleration import ObservedImpact
-from ..inference.observe_push import ObservedPush
-from ..inference.posterior import Posterior
+from ..inference.fits.fitting import Fit
+from ..inference.fits.posterior import Posterior
+from ..inference.observations.observe import Observed, ObservedDrop
+from ..inference.observations.observe_acceleration import ObservedImpact
+from ..inference.observations.observe_push import ObservedPush
 from ..inference.scatter import ScatterEstimate
 from ..inference.workbench import Workbench
 from ..records import Campaign, Drop

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..diagnosis.campaign import Diagnosis
 from ..inference.calibrate import Calibration
-from ..inference.fitting import Fit
-from ..inference.forward import Instant, predict_depth
+from ..inference.emulation.forward import Instant, predict_depth
+from ..inference.fits.fitting import Fit
+from ..inference.fits.posterior import Posterior
 from ..inference.observations.acceleration_model import AccelerationModel
 from ..inference.observations.drop_model import DropModel
 from ..inference.observations.push_model import PushModel
-from ..inference.posterior import Posterior
 from ..inference.workbench import Workbench
 from ..records import STANDARD_GRAVITY, FloatArray, Projectile
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..inference.posterior import Posterior
+from ..inference.fits.posterior import Posterior
 from ..records import FloatArray
 from .campaign_figures import DIFFERENCE, say_projectile
 from .drop_views import DropView

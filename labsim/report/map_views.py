@@ -10,7 +10,7 @@ import numpy as np
 
 from ..ct.reduce import reduce_scan
 from ..errors import MeasurementError
-from ..inference.fitting import Fit
+from ..inference.fits.fitting import Fit
 from ..inference.observations.compacted_zone import CompactedZones
 from ..inference.workbench import Workbench
 from ..records import Campaign, FillingMap, FloatArray

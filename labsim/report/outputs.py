@@ -17,9 +17,9 @@ from ..diagnosis.next_experiment import Suggestion, suggest
 from ..diagnosis.summary import SummaryDiagnosis
 from ..effects import Model, list_effects, write_model
 from ..inference.calibrate import Calibration
-from ..inference.fitting import Fit
-from ..inference.posterior import Posterior
-from ..inference.summary import SummaryCalibration
+from ..inference.fits.fitting import Fit
+from ..inference.fits.posterior import Posterior
+from ..inference.published.calibrate import SummaryCalibration
 from . import campaign_figures as figures
 from .campaign_page import write_calibration_page, write_campaign_page
 from .campaign_tables import (

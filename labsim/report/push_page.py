@@ -18,7 +18,7 @@ from ..calibrated import say_law, show_parameter
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion
 from ..inference.calibrate import Calibration
-from ..inference.fitting import DOUBTFUL, Fit
+from ..inference.fits.fitting import DOUBTFUL, Fit
 from ..inference.observations.push_model import PushModel
 from ..inference.observations.sleeve_friction import SOLVER, SleeveFriction
 from ..inference.workbench import Workbench

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..diagnosis.published_scan import compacted_area
 from ..diagnosis.summary import SummaryDiagnosis
-from ..inference.planar import expected_raw_depth, round_depth
-from ..inference.published import impact_speed
-from ..inference.summary import SummaryCalibration
+from ..inference.published.calibrate import SummaryCalibration
+from ..inference.published.figures import impact_speed
+from ..inference.published.planar import expected_raw_depth, round_depth
 from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, corner_side, new_figure
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from ..diagnosis.prediction import Prediction, people
 from ..diagnosis.summary import SummaryDiagnosis
-from ..inference.planar import ALPHA, READINGS
-from ..inference.summary import REFERENCE_P_M, SummaryCalibration
+from ..inference.published.calibrate import REFERENCE_P_M, SummaryCalibration
+from ..inference.published.planar import ALPHA, READINGS
 from .phrases import state_p_value
 
 VERDICTS = {

@@ -9,7 +9,7 @@ import pytest
 from labsim.diagnosis.average import average_p_m
 from labsim.diagnosis.campaign import allow_for_codes
 from labsim.diagnosis.judge import Verdict
-from labsim.inference.fitting import Fit
+from labsim.inference.fits.fitting import Fit
 from labsim.inference.observations.drop_terms import Terms
 
 RANGE = (300.0, 6000.0)

@@ -12,8 +12,8 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis import campaign
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.judge import NESTED, PRIOR_PAIRS, TEMPERATURE, judge
-from labsim.inference.blocks import Block
-from labsim.inference.fitting import Fit
+from labsim.inference.fits.blocks import Block
+from labsim.inference.fits.fitting import Fit
 from labsim.runs.store import RunStore
 
 CAMPAIGNS = Path(__file__).parents[2] / "data" / "campaigns"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labsim.diagnosis.judge import NAMED, ROUGH_TEMPERATURE, TEMPERATURE, find_class
-from labsim.inference.blocks import Block
+from labsim.inference.fits.blocks import Block
 
 
 def predict(*causes: str, residual=(0.0, 0.0), sigma=0.5):

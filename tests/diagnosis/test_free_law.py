@@ -20,10 +20,10 @@ from labsim.diagnosis.learned_law import learn_law
 from labsim.diagnosis.unknown import FREEDOMS
 from labsim.effects import Place, list_effects
 from labsim.effects.terms import combine
-from labsim.inference.blocks import Block, solve_globals
-from labsim.inference.fitting import fit_hypothesis
+from labsim.inference.fits.blocks import Block, solve_globals
+from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
-from labsim.inference.synthetic import Hidden, TruthTable, measure_hidden
+from labsim.inference.truths.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.runs.store import RunStore
 from labsim.sph import DropSetting
 from labsim.sph.sirono import tabulate_strengths

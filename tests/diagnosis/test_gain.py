@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import kstest, multivariate_normal
 
 from labsim.diagnosis.gain import HeldOut, check_prediction, measure_gain, predict_held_out
-from labsim.inference.blocks import Block
+from labsim.inference.fits.blocks import Block
 from labsim.inference.observations.tracks import DropsBlock
 
 POINTS, DROPS, WIDE, SCALE = 6, 5, 100.0, 0.3

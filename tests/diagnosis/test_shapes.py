@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from labsim.diagnosis.shapes import weigh_shapes
-from labsim.inference.fitting import Fit
+from labsim.inference.fits.fitting import Fit
 
 
 def fit_shape(log_p_m: float, evidence: float) -> Fit:

@@ -13,7 +13,7 @@ from labsim.diagnosis.shapes import lay_out_shapes
 from labsim.diagnosis.untestable import find_combination, list_untestable
 from labsim.effects.priors import Normal
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import Fit, fit_hypothesis
+from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.workbench import Workbench
 
 

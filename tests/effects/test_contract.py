@@ -28,7 +28,7 @@ from labsim.effects import (
 )
 from labsim.effects.loading import list_own_files
 from labsim.errors import EffectError
-from labsim.inference.grid import set_nominal_drop
+from labsim.inference.emulation.grid import set_nominal_drop
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
 from labsim.sph.materials import list_laws

@@ -8,8 +8,8 @@ import emcee
 import numpy as np
 import pytest
 
-from labsim.inference import posterior as posterior_module
-from labsim.inference.posterior import Posterior, sample
+from labsim.inference.fits import posterior as posterior_module
+from labsim.inference.fits.posterior import Posterior, sample
 
 CENTRE, COVARIANCE = np.array([7.0, 0.1]), np.array([[0.01, 0.002], [0.002, 0.04]])
 

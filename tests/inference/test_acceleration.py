@@ -18,12 +18,12 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.gain import predict_held_out
 from labsim.effects import Instrument
-from labsim.inference import steps
 from labsim.inference.calibrate import calibrate, prepare
-from labsim.inference.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.fits import steps
+from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations.acceleration_model import AccelerationModel
 from labsim.inference.scatter import estimate_scatter, set_terms
-from labsim.inference.tangents import linearise_at
 from labsim.records import STANDARD_GRAVITY, Material, Projectile
 from labsim.report.outputs import write_result
 from labsim.sph import DropSetting, simulate

@@ -9,15 +9,15 @@ from scipy.stats import norm
 
 from labsim.effects import LogNormal, Parameter
 from labsim.errors import ExtrapolationError
-from labsim.inference.blocks import solve_globals
-from labsim.inference.curves import FRACTIONS, decode_depth, decode_rate, encode_run
-from labsim.inference.evidence import log_share_inside
-from labsim.inference.forward import Instant, ResponseTable, predict_depth, predict_speed
-from labsim.inference.grid import interpolation_weights, speed_nodes, strength_node
-from labsim.inference.nodes import enclosing_nodes, nearest_nodes
+from labsim.inference.emulation.curves import FRACTIONS, decode_depth, decode_rate, encode_run
+from labsim.inference.emulation.forward import Instant, ResponseTable, predict_depth, predict_speed
+from labsim.inference.emulation.grid import interpolation_weights, speed_nodes, strength_node
+from labsim.inference.emulation.nodes import enclosing_nodes, nearest_nodes
+from labsim.inference.fits.blocks import solve_globals
+from labsim.inference.fits.evidence import log_share_inside
+from labsim.inference.fits.posterior import measure_residual, sample
 from labsim.inference.observations.compacted_zone import Block
-from labsim.inference.observe import observe_drop
-from labsim.inference.posterior import measure_residual, sample
+from labsim.inference.observations.observe import observe_drop
 from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
 from labsim.video.synthetic import evaluate_motion

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labsim.errors import InferenceError
-from labsim.inference.emulator import fit_emulator
+from labsim.inference.published.emulator import fit_emulator
 
 
 def test_power_laws_are_exact() -> None:

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 from labsim.effects import Normal, Parameter
-from labsim.inference import error_sizes
-from labsim.inference.blocks import Block
+from labsim.inference.fits import error_sizes
+from labsim.inference.fits.blocks import Block
 from labsim.inference.observations.drop_terms import Terms
 
 MIDDLE, NOISE, POINTS = math.log(1200.0), 0.01, 40

@@ -11,7 +11,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.inference.calibrate import calibrate
 from labsim.inference.free_fall import doubt_scales, pool
-from labsim.inference.observe import observe_drops, read_observed_track
+from labsim.inference.observations.observe import observe_drops, read_observed_track
 from labsim.records import Measured
 from labsim.report.outputs import write_result
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, list_effects
-from labsim.inference.forward import ResponseTable
-from labsim.inference.grid import (
+from labsim.inference.emulation.forward import ResponseTable
+from labsim.inference.emulation.grid import (
     FELT_STEPS,
     SAME_SPEED,
     interpolation_weights,
@@ -16,7 +16,7 @@ from labsim.inference.grid import (
     smooth_weights,
     strength_node,
 )
-from labsim.inference.nodes import amplitude_nodes, nodes_around
+from labsim.inference.emulation.nodes import amplitude_nodes, nodes_around
 from labsim.inference.workbench import Workbench
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.inference.planar import PLANAR_FACTOR, campaign_setting, expected_raw_depth, round_depth
-from labsim.inference.published import choose_drops, collect_figures
-from labsim.inference.summary import summarise
+from labsim.inference.published.calibrate import summarise
+from labsim.inference.published.figures import choose_drops, collect_figures
+from labsim.inference.published.planar import PLANAR_FACTOR, campaign_setting, expected_raw_depth, round_depth
 
 SEED = read_campaign(Path(__file__).parents[2] / "data" / "guettler2009")
 

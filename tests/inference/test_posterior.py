@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import truncnorm
 
 from labsim.errors import InferenceError
-from labsim.inference.posterior import sample
+from labsim.inference.fits.posterior import sample
 
 CENTRE, SIGMA = np.array([7.0, 0.4]), np.array([0.1, 1e-3])
 

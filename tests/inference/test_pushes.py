@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import labsim.inference.grid as grid_module
+import labsim.inference.emulation.grid as grid_module
 from labsim.calibrated import read_value
 from labsim.campaign import read_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.effects import Instrument, list_places, load_effect
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import fit_hypothesis
-from labsim.inference.grid import INERTIA, hasten, set_nominal_drop, set_push
+from labsim.inference.emulation.grid import INERTIA, hasten, set_nominal_drop, set_push
+from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.measure import Measurements, measure
+from labsim.inference.observations.observe_push import ObservedPush, measure_ground
 from labsim.inference.observations.push_model import encode_push
-from labsim.inference.observe_push import ObservedPush, measure_ground
 from labsim.runs.store import RunStore
 from labsim.sph import simulate
 from labsim.sph.materials import find_law

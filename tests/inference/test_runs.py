@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from labsim.errors import InferenceError, SimulationError
-from labsim.inference.curves import encode_run
+from labsim.inference.emulation.curves import encode_run
 from labsim.records import Material, Projectile
 from labsim.runs import run_file
 from labsim.runs.parts import Compaction, Motion

@@ -12,7 +12,7 @@ from scipy.stats import halfnorm
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import goodness_of_fit
+from labsim.inference.fits.fitting import goodness_of_fit
 from labsim.inference.measure import measure
 from labsim.inference.scatter import WIDTH, allow_scatter, find_larger, find_scatter, set_terms, weigh_least
 from labsim.runs.store import RunStore

@@ -10,9 +10,9 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.effects import Instrument
 from labsim.inference.calibrate import prepare
+from labsim.inference.fits.steps import Place, solve_at
 from labsim.inference.observations.compacted_zone import CompactedZones
 from labsim.inference.observations.drop_terms import Probe, Terms, measure_distances
-from labsim.inference.steps import Place, solve_at
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,10 @@ from labsim.calibrated import set_value
 from labsim.campaign import read_campaign
 from labsim.errors import InferenceError
 from labsim.inference.calibrate import prepare
-from labsim.inference.fitting import Fit, fit_hypothesis
-from labsim.inference.grid import hasten, set_nominal_drop, set_push
+from labsim.inference.emulation.grid import hasten, set_nominal_drop, set_push
+from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.measure import Measurements, measure
+from labsim.inference.observations.observe_push import ObservedPush
 from labsim.inference.observations.push_model import encode_push
 from labsim.inference.observations.sleeve_friction import (
     USUAL,
@@ -23,7 +24,6 @@ from labsim.inference.observations.sleeve_friction import (
     encode_sleeve,
     measure_spread,
 )
-from labsim.inference.observe_push import ObservedPush
 from labsim.inference.supported import refuse_others
 from labsim.inspection.drops import inspect_drop
 from labsim.records import Campaign, Material, Sleeve

@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import dblquad
 
 from labsim.effects import Normal, Parameter
-from labsim.inference import fitting, steps
-from labsim.inference.blocks import Block
 from labsim.inference.calibrate import warn_unsettled
+from labsim.inference.fits import fitting, steps
+from labsim.inference.fits.blocks import Block
 
 RANGE = (300.0, 6000.0)
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.inference import strength
-from labsim.inference.strength import StrengthCount, hide
-from labsim.inference.synthetic import QUIET, measure_hidden
-from labsim.inference.truth import Hidden, TruthTable
+from labsim.inference.truths import strength
+from labsim.inference.truths.strength import StrengthCount, hide
+from labsim.inference.truths.synthetic import QUIET, measure_hidden
+from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"

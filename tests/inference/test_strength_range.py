@@ -10,8 +10,8 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
-from labsim.inference import fitting
 from labsim.inference.calibrate import calibrate
+from labsim.inference.fits import fitting
 from labsim.report.outputs import write_result
 
 TRUE = 1300.0  # Pa, of laws.write_campaign

@@ -10,10 +10,10 @@ import pytest
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import reduce_scan
 from labsim.errors import SimulationError
-from labsim.inference.curves import encode_run
+from labsim.inference.emulation.curves import encode_run
 from labsim.inference.observations.compacted_zone import see_dust
-from labsim.inference.synthetic import QUIET, measure_hidden
-from labsim.inference.truth import Hidden, TruthTable
+from labsim.inference.truths.synthetic import QUIET, measure_hidden
+from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.sph import simulate
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"

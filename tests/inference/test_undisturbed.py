@@ -11,10 +11,10 @@ from labsim.ct.phantom import Phantom
 from labsim.ct.reduce import reduce_scan
 from labsim.diagnosis.shapes import lay_out_shapes, shape_parameter
 from labsim.effects import list_effects
+from labsim.inference.fits.tangents import linearise_alone
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observations.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.inference.open_workbench import open_workbench
-from labsim.inference.tangents import linearise_alone
 from labsim.records import Scan
 from labsim.runs.store import RunStore
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import labsim
-from labsim.inference.posterior import sample
+from labsim.inference.fits.posterior import sample
 from labsim.runs.run_file import write_run_file
 
 

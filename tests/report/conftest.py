@@ -13,7 +13,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.summary import diagnose_summary
 from labsim.inference.calibrate import calibrate
-from labsim.inference.summary import calibrate_summary
+from labsim.inference.published.calibrate import calibrate_summary
 from labsim.report.outputs import write_result
 
 SEED = Path(__file__).parents[2] / "data" / "guettler2009"

@@ -15,7 +15,7 @@ from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.effects.model import Model
 from labsim.errors import EffectError
 from labsim.inference.calibrate import calibrate
-from labsim.inference.target import integrate_evidence
+from labsim.inference.fits.target import integrate_evidence
 from labsim.report.outputs import write_result
 
 

@@ -13,7 +13,7 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.cli import main
 from labsim.errors import CampaignError, LabsimError, MeasurementError
-from labsim.inference.observe import observe_drops
+from labsim.inference.observations.observe import observe_drops
 from labsim.records import Camera
 from labsim.tracks import find_format, list_formats, read_rows
 from labsim.video import read_track

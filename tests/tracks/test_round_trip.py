@@ -13,7 +13,7 @@ from campaign_files import CAMPAIGN, DROP, fill_in
 
 from labsim.campaign import read_campaign
 from labsim.cli import main
-from labsim.inference.observe import observe_drops, read_observed_track
+from labsim.inference.observations.observe import observe_drops, read_observed_track
 from labsim.video import open_frames
 
 DATA = Path(__file__).parents[2] / "data" / "video"

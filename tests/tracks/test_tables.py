@@ -13,7 +13,7 @@ from campaign_files import CAMPAIGN, DROP
 import labsim
 from labsim.campaign import read_campaign
 from labsim.errors import CampaignError, MeasurementError
-from labsim.inference.observe import read_observed_track
+from labsim.inference.observations.observe import read_observed_track
 from labsim.records import Camera
 from labsim.tracks import place_points, read_points, read_rows
 from labsim.tracks.table import read_mapping

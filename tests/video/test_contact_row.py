@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from labsim.campaign import read_campaign
-from labsim.inference.observe import read_observed_track
+from labsim.inference.observations.observe import read_observed_track
 from labsim.records import Camera, DecelerationCurve, Track
 from labsim.video.contact_row import find_surface_row
 from labsim.video.curve import fit_deceleration

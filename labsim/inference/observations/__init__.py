@@ -25,8 +25,8 @@ from ...errors import InferenceError, LabsimError
 from ...extensions import announce_code, list_modules
 from ...records import Campaign, FloatArray
 from ...sph.plugins import load_module
-from ..blocks import Block
-from ..forward import ResponseTable
+from ..emulation.forward import ResponseTable
+from ..fits.blocks import Block
 from .drop_terms import Probe, Terms
 
 

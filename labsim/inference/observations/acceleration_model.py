@@ -22,9 +22,9 @@ from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph.profile import is_blunt
 from ...sph.tips import make_profile
-from ..curves import decode_speed
-from ..forward import Instant, ResponseTable
-from ..observe_acceleration import BINS, ObservedImpact
+from ..emulation.curves import decode_speed
+from ..emulation.forward import Instant, ResponseTable
+from .observe_acceleration import BINS, ObservedImpact
 
 # Of the largest deceleration, of a mean over 1/BINS of the stop, where the tip goes USUAL_DEPTH tip radii deep: how far the
 # simulated force is off from another code's. The fewer particles a tip passes the rougher its force: both grow as the depth to

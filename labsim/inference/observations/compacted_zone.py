@@ -23,8 +23,8 @@ from ...effects import Instrument
 from ...records import FillingMap, FloatArray, Scan
 from ...runs.parts import Compaction
 from ...sph import DropRun
-from ..blocks import Block, lay_out
-from ..forward import ResponseTable
+from ..emulation.forward import ResponseTable
+from ..fits.blocks import Block, lay_out
 from . import RunFeatures
 from .drop_terms import Probe, Terms, measure_distances
 from .undisturbed import GREY, observe_undisturbed

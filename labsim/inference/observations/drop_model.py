@@ -11,8 +11,8 @@ import numpy as np
 
 from ...effects import Instrument
 from ...records import Camera, FloatArray
-from ..forward import Instant, ResponseTable, predict_depth, predict_speed
-from ..observe import ObservedDrop
+from ..emulation.forward import Instant, ResponseTable, predict_depth, predict_speed
+from .observe import ObservedDrop
 
 BIN = 8  # frames of free fall averaged into one point
 ALONG = 0.4  # of the stopping time, over which the solver's error of the depth changes

@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph import DropSetting
-from ..forward import Instant
+from ..emulation.forward import Instant
 from .acceleration_model import AccelerationModel
 from .drop_model import ALONG, FREE, REACH, SPEED_WIDTH, DropModel
 from .push_model import PushModel

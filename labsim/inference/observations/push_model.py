@@ -18,9 +18,9 @@ from ...effects import Instrument
 from ...records import FloatArray
 from ...runs.parts import Push
 from ...sph import DropRun
-from ..forward import Instant, ResponseTable
-from ..observe_push import Ground, ObservedPush
+from ..emulation.forward import Instant, ResponseTable
 from .drop_model import REACH
+from .observe_push import Ground, ObservedPush
 
 PROFILE = 3.0  # of ln strength in each window, prior width: as good as free
 

@@ -22,10 +22,10 @@ from ...effects import Instrument
 from ...records import FloatArray
 from ...runs.parts import Push
 from ...sph import DropRun
-from ..blocks import Block, add_errors, lay_out
-from ..observe_push import ObservedPush
+from ..fits.blocks import Block, add_errors, lay_out
 from . import RunFeatures, WithoutNuisances
 from .drop_terms import Probe, Terms
+from .observe_push import ObservedPush
 
 SOLVER = 0.20  # of the simulated ratio: spacing, a shaft shorter than a sleeve (benchmarks/sleeve.py)
 USUAL = 0.10  # of the ratio, along the depth and from record to record: where too few records say it

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from ...errors import InferenceError
 from ...records import Campaign, FloatArray, Material, StrengthTest
 from ...sph.sirono import compressive_strength, tensile_strength
-from ..blocks import Block
+from ..fits.blocks import Block
 from . import Direct
 from .drop_terms import Probe, Terms
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...records import FloatArray
-from ..blocks import Block, add_errors, lay_out
-from ..forward import Instant
+from ..emulation.forward import Instant
+from ..fits.blocks import Block, add_errors, lay_out
 from . import RunFeatures
 from .drop_model import REACH, WIDTHS
 from .drop_terms import (

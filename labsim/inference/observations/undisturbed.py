@@ -18,7 +18,7 @@ import numpy as np
 from ...ct.reduce import ReducedScan
 from ...records import FloatArray, Scan
 from ...sph.particles import initial_filling_factor
-from ..blocks import Block
+from ..fits.blocks import Block
 from . import Direct
 from .drop_terms import Probe, Terms
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly
 
-from ..records import FloatArray
-from ..runs.parts import Motion
-from ..sph import DropRun
-from ..sph.profile import is_blunt
-from ..sph.tips import make_profile
+from ...records import FloatArray
+from ...runs.parts import Motion
+from ...sph import DropRun
+from ...sph.profile import is_blunt
+from ...sph.tips import make_profile
 
 FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)

@@ -13,17 +13,17 @@ from functools import partial
 
 import numpy as np
 
-from ..ct.reduce import ReducedScan
-from ..effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
-from ..errors import SimulationError
-from ..records import STANDARD_GRAVITY, Campaign, FloatArray, Projectile, Scan
-from ..runs.store import Progress, RunStore
-from ..sph import DropRun, DropSetting
-from .curves import encode_run
-from .forward import ResponseTable
-from .grid import set_nominal_drop
-from .nodes import place_strength
-from .observations.compacted_zone import see_dust
+from ...ct.reduce import ReducedScan
+from ...effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
+from ...errors import SimulationError
+from ...records import STANDARD_GRAVITY, Campaign, FloatArray, Projectile, Scan
+from ...runs.store import Progress, RunStore
+from ...sph import DropRun, DropSetting
+from ..emulation.curves import encode_run
+from ..emulation.forward import ResponseTable
+from ..emulation.grid import set_nominal_drop
+from ..emulation.nodes import place_strength
+from ..observations.compacted_zone import see_dust
 
 TRUTH_CELLS, TRUTH_SCAN_CELLS = 6, 10
 SPEED_ANCHOR, SPEED_RATIO = 0.13, 1.6

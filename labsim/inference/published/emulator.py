@@ -11,8 +11,8 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from ..errors import InferenceError
-from ..records import FloatArray
+from ...errors import InferenceError
+from ...records import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..acceleration import LOST, Acceleration, Impact, find_impact, read_acceleration
-from ..errors import MeasurementError
-from ..records import Drop, FloatArray, Measured
+from ...acceleration import LOST, Acceleration, Impact, find_impact, read_acceleration
+from ...errors import MeasurementError
+from ...records import Drop, FloatArray, Measured
 
 BINS = 40  # to the stop; a run's own table has as many
 # of the stop, compared: at it the force breaks off, and no straight line in ln p_m follows a break that moves

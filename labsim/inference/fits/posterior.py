@@ -19,9 +19,9 @@ from typing import Any
 import emcee
 import numpy as np
 
-from ..errors import InferenceError
-from ..records import FloatArray
-from ..runs.store import Progress
+from ...errors import InferenceError
+from ...records import FloatArray
+from ...runs.store import Progress
 from .chain import fingerprint, read_chain, write_chain
 
 REACH = 2.5  # standard deviations at which the residual is measured

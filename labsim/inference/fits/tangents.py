@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from ..records import FloatArray
+from ...records import FloatArray
+from ..observations import Observation
+from ..observations.drop_terms import Probe
+from ..workbench import Workbench
 from .blocks import Block
-from .observations import Observation
-from .observations.drop_terms import Probe
-from .workbench import Workbench
 
 Blocks = tuple[Block, ...]  # one an observation, in the workbench's order
 

@@ -17,12 +17,12 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 from scipy.special import logsumexp
 
-from ..records import FloatArray
+from ...records import FloatArray
+from ..workbench import Workbench
 from .blocks import Block
 from .fitting import Fit
 from .tangents import linearise_at
 from .target import Target
-from .workbench import Workbench
 
 SPREAD = math.log(2.0)
 SIZES = np.linspace(-1.5, 1.5, 7)  # ln of sizes over the stated ones

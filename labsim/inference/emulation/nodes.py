@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..effects import Effect
+from ...effects import Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from ..emulation.nodes import nodes_around
+from ..workbench import Workbench
 from .fitting import Fit, fit_hypothesis
-from .nodes import nodes_around
-from .workbench import Workbench
 
 LARGE = 0.5  # of an effect's step
 LARGE_CHANGE = 0.1  # of the largest datum of a drop, where accelerometers are and steps are long

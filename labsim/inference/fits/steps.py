@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..records import FloatArray
+from ...records import FloatArray
+from ..workbench import Workbench
 from .blocks import Block, solve_globals
 from .tangents import Blocks, linearise_at
-from .workbench import Workbench
 
 SETTLED = 0.02  # of a standard deviation
 CALM = 0.05  # move of nuisances, as move_nuisances counts it

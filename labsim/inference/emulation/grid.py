@@ -15,14 +15,14 @@ from itertools import product
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..calibrated import read_constant, set_value
-from ..records import Campaign, FloatArray, Projectile
-from ..records import Motion as Led
-from ..runs.parts import AnyPart, Compaction, Motion, Part, Push
-from ..runs.run_file import FailedRun
-from ..runs.store import Progress, RunStore
-from ..sph import DropSetting
-from ..sph.materials import find_law
+from ...calibrated import read_constant, set_value
+from ...records import Campaign, FloatArray, Projectile
+from ...records import Motion as Led
+from ...runs.parts import AnyPart, Compaction, Motion, Part, Push
+from ...runs.run_file import FailedRun
+from ...runs.store import Progress, RunStore
+from ...sph import DropSetting
+from ...sph.materials import find_law
 
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa

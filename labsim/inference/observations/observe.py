@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import MeasurementError
-from ..records import Campaign, DecelerationCurve, Drop, FloatArray, Track
-from ..video.curve import fit_deceleration
-from ..video.track_file import read_track
+from ...errors import MeasurementError
+from ...records import Campaign, DecelerationCurve, Drop, FloatArray, Track
+from ...video.curve import fit_deceleration
+from ...video.track_file import read_track
 from .observe_acceleration import ObservedImpact, observe_impact
 from .observe_push import ObservedPush, observe_push
 
@@ -108,7 +108,7 @@ def read_observed_track(drop: Drop) -> Track:
     assert drop.camera is not None and drop.record.path is not None
     if drop.record.kind == "track":
         return read_track(drop.record.path, drop.camera, drop.record.row_sigma, left_out=drop.record.left_out)
-    from ..video import open_frames, track_projectile  # the readers of pixels are only needed here
+    from ...video import open_frames, track_projectile  # the readers of pixels are only needed here
 
     return track_projectile(
         open_frames(drop.record.path),

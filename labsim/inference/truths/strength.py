@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects import Effect
-from ..errors import LabsimError
-from ..records import Campaign
-from ..runs.store import RunStore
-from .calibrate import prepare
+from ...effects import Effect
+from ...errors import LabsimError
+from ...records import Campaign
+from ...runs.store import RunStore
+from ..calibrate import prepare
 from .synthetic import QUIET, measure_hidden
 from .truth import Hidden, TruthTable
 

@@ -17,7 +17,7 @@ import emcee
 import h5py
 import numpy as np
 
-from ..records import FloatArray
+from ...records import FloatArray
 
 NAME = "mcmc"  # emcee's
 

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.linalg import helmert
 from scipy.optimize import minimize
 
-from ..errors import MeasurementError
-from ..force import ForceRecord, read_force
-from ..records import Campaign, Drop, FloatArray, Gauge, Measured
+from ...errors import MeasurementError
+from ...force import ForceRecord, read_force
+from ...records import Campaign, Drop, FloatArray, Gauge, Measured
 
 WINDOW = 56.0  # tip radii; clays are felt over some 10 to 30 (Lunne, Robertson & Powell 1997)
 DEEP = 10.0  # tip radii, from which on a push is deep: its resistance no longer depends on the surface

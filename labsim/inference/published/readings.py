@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from ..records import Drop, FloatArray
+from ...records import Drop, FloatArray
 from .emulator import Emulator
+from .figures import FIGURE_KINDS, Figure, published_figure
 from .planar import READINGS
-from .published import FIGURE_KINDS, Figure, published_figure
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..calibrated import name_column
-from ..effects import Parameter
-from ..errors import InferenceError
-from ..records import FloatArray
+from ...calibrated import name_column
+from ...effects import Parameter
+from ...errors import InferenceError
+from ...records import FloatArray
+from ..observations.acceleration_model import AccelerationModel
+from ..workbench import Workbench
 from .blocks import whiten_all
 from .fitting import Fit
-from .observations.acceleration_model import AccelerationModel
 from .posterior import QuadraticResidual, measure_residual
 from .tangents import linearise_at
-from .workbench import Workbench
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects import Parameter
-from ..errors import ExtrapolationError
-from ..records import STANDARD_GRAVITY, FloatArray
+from ...effects import Parameter
+from ...errors import ExtrapolationError
+from ...records import STANDARD_GRAVITY, FloatArray
 from .curves import decode_depth, decode_rate
 from .grid import STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
 

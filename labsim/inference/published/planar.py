@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from ..records import Campaign, Material, Planar, Projectile
-from ..sph import DropSetting, Numerics
+from ...records import Campaign, Material, Planar, Projectile
+from ...sph import DropSetting, Numerics
 
 PLANAR_FACTOR = 8.0 / (3.0 * math.pi)
 DURATION_PER_RADIUS = (

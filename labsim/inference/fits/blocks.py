@@ -12,8 +12,8 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from ..errors import ExtrapolationError
-from ..records import FloatArray
+from ...errors import ExtrapolationError
+from ...records import FloatArray
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..records import FloatArray
+from ...records import FloatArray
+from ..emulation.nodes import amplitude_nodes, nearest_nodes, nodes_around, screening_node
+from ..observations.tracks import DropsBlock
+from ..workbench import Workbench
 from .blocks import Block
 from .evidence import integrate_by_laplace
-from .nodes import amplitude_nodes, nearest_nodes, nodes_around, screening_node
-from .observations.tracks import DropsBlock
 from .steps import (
     LOWER,
     Place,
@@ -30,7 +31,6 @@ from .steps import (
     stop_at_limits,
 )
 from .tangents import Blocks, linearise_at
-from .workbench import Workbench
 
 Hypothesis = tuple[str, ...]
 # a fit has this many steps; beyond PATIENT each has to gain more than LOWER, but not where accelerometers are: there p_m and a

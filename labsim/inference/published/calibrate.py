@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..records import Campaign, Drop, FloatArray
-from ..runs.store import Progress, RunStore, require_stopped
-from ..sph import DropRun, DropSetting
+from ...records import Campaign, Drop, FloatArray
+from ...runs.store import Progress, RunStore, require_stopped
+from ...sph import DropRun, DropSetting
+from ..fits.posterior import Posterior, sample
 from .emulator import Emulator, fit_emulator
+from .figures import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
 from .planar import SPACING, campaign_setting
-from .posterior import Posterior, sample
-from .published import FIGURE_KINDS, Figure, choose_drops, collect_figures, impact_speed
 from .readings import FigureLikelihood, NumericalError, Reading, integrate_reading, list_readings
 
 REFERENCE_P_M = 1300.0  # Pa, the seed's dynamic value: where the two spacings are compared

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
-from ..records import FloatArray
+from ...records import FloatArray
+from ..workbench import Workbench
 from .steps import Solved, stop_at_limits
-from .workbench import Workbench
 
 MOST_CUT = 1.0 - 1e-12  # of a Gaussian, by two limits closer than rounding
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..ct.reduce import ReducedScan
-from ..effects import Instrument, list_places
-from ..records import STANDARD_GRAVITY, Drop, Track
-from ..sph.particles import initial_filling_factor
-from .forward import Instant, predict_depth
-from .measure import Measurements
-from .observations.undisturbed import UndisturbedDust
-from .observe import Observed, observe_drop
+from ...ct.reduce import ReducedScan
+from ...effects import Instrument, list_places
+from ...records import STANDARD_GRAVITY, Drop, Track
+from ...sph.particles import initial_filling_factor
+from ..emulation.forward import Instant, predict_depth
+from ..measure import Measurements
+from ..observations.observe import Observed, observe_drop
+from ..observations.undisturbed import UndisturbedDust
 from .truth import DRIFT, Hidden, TruthTable
 
 AFTER_STOP = 1.1  # frames kept, in stopping times

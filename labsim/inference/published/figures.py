@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..errors import InferenceError
-from ..records import STANDARD_GRAVITY, Campaign, Drop, Measured
+from ...errors import InferenceError
+from ...records import STANDARD_GRAVITY, Campaign, Drop, Measured
+from ..supported import refuse_others
 from .planar import expected_raw_depth
-from .supported import refuse_others
 
 FIGURE_KINDS = ("depth", "stopping_time")
 

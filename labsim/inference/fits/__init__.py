@@ -1,0 +1,1 @@
+"""Fits of one hypothesis: the linearised problem, its steps, evidence, and the posterior about the best point."""

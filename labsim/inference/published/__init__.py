@@ -1,0 +1,1 @@
+"""p_m from published figures, as depth and stopping time, in place of records."""
