@@ -27,7 +27,7 @@ from scipy.optimize import minimize
 from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
 from labsim.diagnosis.shapes import lay_out_shapes
-from labsim.diagnosis.unknown import fit_unknown
+from labsim.diagnosis.unlisted.unknown import fit_unknown
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.blocks import solve_globals
 from labsim.inference.fits.fitting import Fit, fit_hypothesis

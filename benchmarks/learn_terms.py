@@ -21,7 +21,7 @@ from own_campaigns import STANDARD, open_campaign
 
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.inference.truths.synthetic import LABORATORY, Hidden, TruthTable, measure_hidden
-from labsim.report.law_words import describe_learned
+from labsim.report.pages.law_words import describe_learned
 from labsim.runs.store import RunStore
 
 # name -> place and (x, radius m) -> value in Pa or share

@@ -24,14 +24,14 @@ if TYPE_CHECKING:  # pragma: no cover
 
     from .ct import ReducedScan
     from .diagnosis.campaign import Diagnosis
-    from .diagnosis.summary import SummaryDiagnosis
+    from .diagnosis.published.campaign import SummaryDiagnosis
     from .inference.calibrate import Calibration
     from .inference.fits.posterior import Posterior
     from .inference.published.calibrate import SummaryCalibration
     from .report.outputs import Axes, Figure
     from .runs.store import RunStore
     from .sph import DropRun, DropSetting
-    from .video.following import Progress
+    from .video.projectile.following import Progress
 
 
 def track(
@@ -234,7 +234,7 @@ def diagnose(
         from .diagnosis.campaign import diagnose_campaign
 
         return diagnose_campaign(read, opened, **settings)
-    from .diagnosis.summary import diagnose_summary
+    from .diagnosis.published.campaign import diagnose_summary
     from .inference.published.calibrate import calibrate_summary
 
     return diagnose_summary(calibrate_summary(read, opened, **settings), opened, **settings)
@@ -261,7 +261,7 @@ def write_report(
     Path
         The folder. ``report.html`` in it is one file with all pictures (of published figures: of a diagnosis only).
     """
-    from .report.formats import further_formats
+    from .report.figures.formats import further_formats
     from .report.outputs import write_result
     from .results import SAID
 
@@ -315,7 +315,7 @@ def plot(found: object, ax: Axes | None = None) -> Axes:
         Of anything else.
     """
     from .ct import ReducedScan
-    from .report import axes
+    from .report.figures import axes
 
     if isinstance(found, ReducedScan):
         from .ct import make_dataset

@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # pragma: no cover
     import pandas as pd
     import xarray as xr
 
-    from .report.axes import Axes
+    from .report.figures.axes import Axes
 
 # summary file -> what it is of, its table and its grid; where a folder has several, the first stands for it
 KINDS = {
@@ -100,7 +100,7 @@ class Result:
 
     def plot_curve(self, ax: Axes | None = None) -> Axes:
         """Depth (mm) against time (ms) of a track, with its band of one sigma, or of a run."""
-        from .report.axes import plot_depth
+        from .report.figures.axes import plot_depth
 
         if self.table != "curve.csv":
             raise LabsimError(self.folder, self.kind, "has no curve; a track or a run has")
@@ -108,7 +108,7 @@ class Result:
 
     def plot_map(self, ax: Axes | None = None) -> Axes:
         """Filling factor of a scan about its axis, mm."""
-        from .report.axes import plot_filling_factor
+        from .report.figures.axes import plot_filling_factor
 
         if self.grid != "map.nc":
             raise LabsimError(self.folder, self.kind, "has no map; a scan has")
@@ -116,7 +116,7 @@ class Result:
 
     def plot_posterior(self, name: str = "p_m_Pa", ax: Axes | None = None) -> Axes:
         """Posterior density of one parameter of a calibration or diagnosis. name : a column of ``to_dataframe``."""
-        from .report.axes import plot_density
+        from .report.figures.axes import plot_density
 
         if self.grid != "posterior.nc":
             raise LabsimError(self.folder, self.kind, "has no posterior; a calibration or a diagnosis has")

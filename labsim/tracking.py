@@ -17,7 +17,7 @@ from .campaign import read_drop
 from .errors import MeasurementError
 from .records import Camera, DecelerationCurve, Drop, Measured, Track
 from .tracks import Points, find_format, place_points, read_points
-from .video.following import Progress
+from .video.projectile.following import Progress
 
 NOMINAL_PIXEL = (
     1e-5  # m, of the rows that stand for a table of lengths without a camera; the surface is its row 0

@@ -20,7 +20,7 @@ from scipy.interpolate import UnivariateSpline
 
 from labsim.errors import MeasurementError
 from labsim.records import Camera, Track
-from labsim.video.curve import fit_deceleration
+from labsim.video.motion.curve import fit_deceleration
 
 RATE, PIXEL, SURFACE = 10_000.0, 20e-6, 300.0
 GRAVITY = 9.81 / PIXEL / RATE**2  # px per frame squared

@@ -19,7 +19,7 @@ from . import options
 
 def write_files(folder: Path, tracked: Tracked) -> list[str]:
     """Tables and pictures; their names."""
-    from ..report import track_figures
+    from ..report.figures import tracks as track_figures
 
     request, found, curve, seen = tracked.request, tracked.track, tracked.curve, tracked.seen
     frames = request.frames
@@ -69,7 +69,7 @@ def _choose_moments(found: Track, curve: DecelerationCurve | None) -> list[int]:
 
 def draw_failure(request: Request, path: Path, trouble: LabsimError) -> None:
     """What was seen of a record that could not be measured, with the reason; nothing where nothing can be shown."""
-    from ..report import track_figures
+    from ..report.figures import tracks as track_figures
 
     if request.frames is not None:
         with suppress(LabsimError):

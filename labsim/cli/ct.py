@@ -144,7 +144,7 @@ def reduce_record(
 ) -> tuple[dict[str, Any], str]:
     """Files of one scan; its summary and the lines for people."""
     from ..ct import compress, reduce_scan, summarise_scan, write_compressed, write_map
-    from ..report.map_figures import draw_compressed, draw_map
+    from ..report.figures.maps import draw_compressed, draw_map
 
     began = time.perf_counter()
     reduced = reduce_scan(

@@ -10,7 +10,7 @@ import typer
 
 from ..campaign import read_campaign
 from ..diagnosis.campaign import Diagnosis, diagnose_campaign
-from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
+from ..diagnosis.published.campaign import SummaryDiagnosis, diagnose_summary
 from ..examples import example
 from ..inference.published.calibrate import calibrate_summary
 from ..results import SAID

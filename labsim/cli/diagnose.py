@@ -9,7 +9,7 @@ import typer
 
 from ..campaign import read_campaign
 from ..diagnosis.campaign import Diagnosis, diagnose_campaign
-from ..diagnosis.summary import SummaryDiagnosis, diagnose_summary
+from ..diagnosis.published.campaign import SummaryDiagnosis, diagnose_summary
 from ..runs.store import RunStore
 from . import options
 from ._published import PUBLISHED_ONLY, BulkModulus, PlanarCorrection, Use, calibrate_figures, refuse_options

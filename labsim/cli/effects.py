@@ -14,7 +14,7 @@ from ..effects import KINDS, Effect, Parameter, list_effects
 from ..effects.model import read_model
 from ..effects.terms import list_terms
 from ..errors import EffectError
-from ..report.phrases import shown_unit
+from ..report.pages.phrases import shown_unit
 from . import options
 
 WIDE = 130  # columns that the table needs; a list below that, and into files

@@ -16,7 +16,7 @@ import typer
 
 from .. import text_files
 from ..errors import LabsimError
-from ..report.formats import FORMATS, further_formats
+from ..report.figures.formats import FORMATS, further_formats
 from ..results import SAID
 from . import _provenance
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InferenceError
-from ..report.phrases import say_count
+from ..report.pages.phrases import say_count
 from ..runs.store import RunStore
 from . import options
 

@@ -118,7 +118,7 @@ def simulate(
     runs = require_runs(found)
     summary, lines = write_run(runs, folder)
     if movie:
-        from ..report.movie import draw_movie
+        from ..report.figures.movie import draw_movie
 
         draw_movie(min(runs, key=lambda each: each.setting.spacing), folder / "run.mp4")
     lines = "\n".join([lines, *unseen])
@@ -134,7 +134,7 @@ def simulate(
 def write_run(runs: list[DropRun], folder: Path) -> tuple[dict, str]:
     """Files of the finest run; with several spacings the extrapolated values and their sigma."""
     from ..report.fields import run_summary, write_curve, write_fields
-    from ..report.run_figures import draw_density_field, draw_run
+    from ..report.figures.runs import draw_density_field, draw_run
 
     run = min(runs, key=lambda each: each.setting.spacing)
     write_run_file(folder / "run.h5", run)

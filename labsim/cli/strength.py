@@ -30,7 +30,7 @@ def strength(
     from ..inference.fits.fitting import REJECTED
     from ..inference.observations.drop_terms import Terms
     from ..inference.observations.static_tests import PARAMETERS, fit_softness, fit_strength
-    from ..report.strength_figures import draw_strength
+    from ..report.figures.strengths import draw_strength
 
     read = read_campaign(campaign)
     if not read.strength_tests:

@@ -8,7 +8,7 @@ from .compressed import balance_mass, cell_volumes, coarsen, compress, count_vox
 from .project import project
 from .reduce import ReducedScan, mask_near_bead, reduce_scan
 from .save import make_dataset, summarise_scan, write_compressed, write_map
-from .stack import open_stack
+from .slices.stack import open_stack
 
 __all__ = [
     "ReducedScan", "balance_mass", "cell_volumes", "coarsen", "compress", "count_voxels", "make_dataset", "mask_near_bead",

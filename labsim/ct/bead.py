@@ -13,8 +13,8 @@ from ..errors import MeasurementError
 from ..records import FloatArray, Measured, Scan
 from .bead_edge import REACH, WIDE, cut_box, find_widest, fit_blur, fit_clipped_edge, fit_wide_blur
 from .bead_size import measure_size, say_what_fits, warn_of_density, warn_of_size
-from .neighbours import find_bright_jumps
-from .stack import SliceStack
+from .slices.neighbours import find_bright_jumps
+from .slices.stack import SliceStack
 
 RAYS = 600
 COARSE_REACH = 2.0  # voxels by which the coarse volume of a saturated bead may be larger in radius

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.special import erfc
 
 from ..records import FloatArray
-from .stack import SliceStack
+from .slices.stack import SliceStack
 
 REACH = 3.5  # voxels about the bead's edge in which its width is fitted
 WIDE, WIDE_PASSES = 1.3, 4  # voxels of blur from which its outside has to be looked for further away

@@ -9,13 +9,13 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FillingMap, FloatArray, Measured, Scan, Summarised
-from .artefacts import Cupping, fit_cupping, measure_rings, remove_cupping, remove_rings
 from .average import CellErrors, SectorAverage, estimate_errors, fit_tilt
 from .bead import Bead, find_bead
 from .bead_edge import WIDE, find_widest
-from .grey import GreyCheck, check_grey, check_levels, to_filling_factor, warn_of_grey
-from .neighbours import DUST_STEPS, check_neighbours, find_doubled
-from .stack import SliceStack, open_stack
+from .slices.artefacts import Cupping, fit_cupping, measure_rings, remove_cupping, remove_rings
+from .slices.grey import GreyCheck, check_grey, check_levels, to_filling_factor, warn_of_grey
+from .slices.neighbours import DUST_STEPS, check_neighbours, find_doubled
+from .slices.stack import SliceStack, open_stack
 from .surface import Surface, find_surface
 from .systematic import find_directions, find_halo
 from .undisturbed import average_undisturbed, find_undisturbed

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray
-from .stack import SliceStack
+from .slices.stack import SliceStack
 
 LEANS = np.deg2rad(1.5)  # lean of the surface that is followed; smaller ones change no cell by its sigma
 PASSES = 3  # in which the lean is refined

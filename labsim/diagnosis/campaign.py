@@ -40,15 +40,15 @@ from ..records import Campaign, FloatArray
 from ..runs.store import Progress, RunStore
 from .average import average_p_m
 from .explore import EXPLORED, explore, is_open
-from .free_law import fit_hats, is_wanted
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
-from .learned_law import LearnedLaw, learn_law
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, return_to_singles, settle_leading
 from .screen import CLOSE, Score, Screening, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
-from .unknown import UnknownFit, fit_unknown
+from .unlisted.free_law import fit_hats, is_wanted
+from .unlisted.learned_law import LearnedLaw, learn_law
+from .unlisted.unknown import UnknownFit, fit_unknown
 from .untestable import Combination, Untestable, find_combination, list_untestable
 
 HALF = 0.5  # of the best gain, if that is less than CLOSE asks: large effects are not what screening or fingerprints say

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from ..own_keys import ROUND
 from ..records import STANDARD_GRAVITY, DecelerationCurve, Drop, Track
-from ..video.contact_row import find_surface_row
+from ..video.motion.contact_row import find_surface_row
 from .observations.observe import Observed, ObservedDrop
 
 DOUBTED = 4.0  # standard deviations

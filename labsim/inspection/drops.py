@@ -14,7 +14,7 @@ from ..inference.observations.observe_push import observe_push
 from ..inference.surface_rows import doubt_surface_row
 from ..records import STANDARD_GRAVITY, Campaign, DecelerationCurve, Drop, Measured, Track
 from ..video import open_frames
-from ..video.curve import fit_deceleration
+from ..video.motion.curve import fit_deceleration
 from ..video.track_file import find_left_out
 from .found import Found, is_odd
 from .frames import count_missing, judge_frames

@@ -2,7 +2,8 @@
 
 Rows follow one motion: free fall, a deceleration, rest or a small rebound. They cannot jump (a projectile has no infinite
 speed). The curve's fit says which frames it stands on, and finds doubled pictures, frames that were lost and second impacts by
-itself (``labsim.video.curve``); here the rows are looked at on its clock, so that none of them is found again as another fault.
+itself (``video/motion/curve.py``); here the rows are looked at on its clock, so that none of them is found again as another
+fault.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ..records import DecelerationCurve, FloatArray, Track
-from ..video.gaps import find_repeats, list_numbers
+from ..video.motion.gaps import find_repeats, list_numbers
 from ..video.track_file import measure_scatter
 
 CONSECUTIVE = 3  # frames in a row that are worth a word

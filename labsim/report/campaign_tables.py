@@ -23,8 +23,8 @@ from ..inference.published.calibrate import summarise
 from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from ..sph import solver_hash
-from .law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
-from .phrases import (
+from .pages.law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
+from .pages.phrases import (
     CERTAIN,
     say_amount,
     say_combination,
@@ -34,7 +34,7 @@ from .phrases import (
     shown_unit,
     state_p_value,
 )
-from .remedies import say_remedy
+from .pages.remedies import say_remedy
 
 NUMERICAL_DEPTH = (
     0.0033  # rms left of nine depths against an independent solver at DEFAULT_CELLS, docs/other-methods.md

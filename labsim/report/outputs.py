@@ -14,14 +14,12 @@ from .. import text_files
 from ..campaign_tables import MATERIAL_KEYS
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.next_experiment import Suggestion, suggest
-from ..diagnosis.summary import SummaryDiagnosis
+from ..diagnosis.published.campaign import SummaryDiagnosis
 from ..effects import Model, list_effects, write_model
 from ..inference.calibrate import Calibration
 from ..inference.fits.fitting import Fit
 from ..inference.fits.posterior import Posterior
 from ..inference.published.calibrate import SummaryCalibration
-from . import campaign_figures as figures
-from .campaign_page import write_calibration_page, write_campaign_page
 from .campaign_tables import (
     campaign_calibration_lines,
     campaign_calibration_summary,
@@ -31,19 +29,21 @@ from .campaign_tables import (
     is_pushed,
     state_numerical_error,
 )
-from .drop_views import DropView, list_fits, list_posteriors, view_drops
-from .law_figures import draw_laws
-from .map_views import MapView, measure_maps, view_maps
-from .push_page import lay_misfit, lay_pushes, view_pushes, write_push_calibration, write_push_diagnosis
-from .run_figures import draw_density_field
-from .summary_figures import (
+from .figures import campaign as figures
+from .figures.laws import draw_laws
+from .figures.published import (
     draw_compacted_volume,
     draw_corner,
     draw_depth_law,
     draw_fit,
     draw_penetration,
 )
-from .summary_page import write_page
+from .figures.runs import draw_density_field
+from .pages.campaign import write_calibration_page, write_campaign_page
+from .pages.drop_views import DropView, list_fits, list_posteriors, view_drops
+from .pages.map_views import MapView, measure_maps, view_maps
+from .pages.published import write_page
+from .pages.pushes import lay_misfit, lay_pushes, view_pushes, write_push_calibration, write_push_diagnosis
 from .tables import calibration_lines, calibration_summary, diagnosis_lines, diagnosis_summary
 
 Found = Calibration | Diagnosis | SummaryCalibration | SummaryDiagnosis

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..diagnosis.prediction import Prediction, people
-from ..diagnosis.summary import SummaryDiagnosis
+from ..diagnosis.published.campaign import SummaryDiagnosis
+from ..diagnosis.published.prediction import Prediction, people
 from ..inference.published.calibrate import REFERENCE_P_M, SummaryCalibration
 from ..inference.published.planar import ALPHA, READINGS
-from .phrases import state_p_value
+from .pages.phrases import state_p_value
 
 VERDICTS = {
     "none": "what was not calibrated is predicted within its errors",

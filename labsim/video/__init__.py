@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from .checks import check_drop_height
-from .curve import fit_deceleration
 from .formats.folder import read_picture
 from .frames import Frames, open_frames
-from .local import fit_local_polynomial
+from .motion.checks import check_drop_height
+from .motion.curve import fit_deceleration
+from .motion.local import fit_local_polynomial
 from .overlay import draw_contact_sheet, encode_picture, find_top, write_overlay
-from .scale import measure_ruler, scale_from_diameter
+from .picture.scale import measure_ruler, scale_from_diameter
 from .seen import draw_scene
 from .track_file import make_track, read_track, tabulate_curve, tabulate_track, write_curve, write_track
 from .tracker import Tracking, follow_projectile, track_projectile

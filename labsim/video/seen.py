@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import MeasurementError
 from .frames import Frames
-from .outline import Outliner
 from .overlay import BLUE, GREEN
-from .scene import Scene, survey_scene
+from .picture.scene import Scene, survey_scene
+from .projectile.outline import Outliner
 
 SHOWN = (0.0, 0.25, 0.5, 0.75)  # of the record
 

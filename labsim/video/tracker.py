@@ -13,17 +13,17 @@ import numpy as np
 
 from ..errors import MeasurementError
 from ..records import FloatArray, Measured, Track
-from .bead import follow_bead, is_bead
-from .direction import check_direction, straighten
-from .following import Progress
 from .frames import Frames
-from .gaps import find_gaps
-from .joining import raise_to_scatter
-from .lossy import widen_for_hidden
-from .outline import Outline, Outliner
-from .rod import LOSSY_TAILS, Positions, follow_rod
-from .scene import NEAR_CEILING, Scene, survey_scene
-from .steadiness import LEAST_CORRECTED, Movement, describe_movement, follow_surface
+from .motion.gaps import find_gaps
+from .motion.joining import raise_to_scatter
+from .picture.direction import check_direction, straighten
+from .picture.lossy import widen_for_hidden
+from .picture.scene import NEAR_CEILING, Scene, survey_scene
+from .picture.steadiness import LEAST_CORRECTED, Movement, describe_movement, follow_surface
+from .projectile.bead import follow_bead, is_bead
+from .projectile.following import Progress
+from .projectile.outline import Outline, Outliner
+from .projectile.rod import LOSSY_TAILS, Positions, follow_rod
 from .track_file import LEFT_OUT, find_left_out
 
 MOST_SMEAR = 1.5  # steps per frame; beyond, with a radius for what the fit takes for smear

@@ -10,8 +10,8 @@ import pytest
 
 from labsim.campaign import read_scan
 from labsim.ct import balance_mass, compress, count_voxels, reduce_scan
-from labsim.ct.grey import to_filling_factor
 from labsim.ct.phantom import Phantom
+from labsim.ct.slices.grey import to_filling_factor
 from labsim.errors import MeasurementError
 
 DATA = Path(__file__).parents[2] / "data" / "ct" / "labelled_scans"
@@ -96,7 +96,7 @@ def test_axis_off_by_one_voxel_changes_the_map_by_little(tmp_path):
     scan = phantom.write(tmp_path / "slices")
     right = reduce_scan(scan).map
     from labsim.ct.average import SectorAverage
-    from labsim.ct.stack import open_stack
+    from labsim.ct.slices.stack import open_stack
 
     stack = open_stack(scan.slices)
     shifted = SectorAverage(stack.shape, stack.count, (phantom.centre[0] + 1, phantom.centre[1], 0), 2, 40.0)
@@ -180,7 +180,7 @@ def test_counting_voxels_is_biased(tmp_path):
 
 def test_odd_and_even_sectors_agree(tmp_path):
     from labsim.ct.average import SectorAverage
-    from labsim.ct.stack import open_stack
+    from labsim.ct.slices.stack import open_stack
 
     phantom = Phantom()
     scan = phantom.write(tmp_path / "slices")

@@ -5,7 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from labsim.ct.reconstruct import reconstruct_cone
+from labsim.ct.slices.reconstruct import reconstruct_cone
 from labsim.errors import MeasurementError
 
 PIXEL, TO_AXIS, TO_CAMERA = 50e-6, 0.10, 0.05  # m

@@ -13,7 +13,7 @@ from PIL import Image
 from labsim.ct import open_stack, reduce_scan
 from labsim.ct.formats.images import read_image, read_rescale
 from labsim.ct.phantom import Phantom
-from labsim.ct.reconstruct import (
+from labsim.ct.slices.reconstruct import (
     absorb,
     find_centre,
     find_centre_of_mass,
@@ -22,7 +22,7 @@ from labsim.ct.reconstruct import (
     read_projections,
     reconstruct_parallel,
 )
-from labsim.ct.skyscan import read_log
+from labsim.ct.slices.skyscan import read_log
 from labsim.errors import MeasurementError
 
 DATA = Path(__file__).parents[2] / "data" / "ct"
@@ -242,7 +242,7 @@ def test_absorb():
 
 
 def test_cone_beam_needs_astra():
-    from labsim.ct.reconstruct import reconstruct_cone
+    from labsim.ct.slices.reconstruct import reconstruct_cone
 
     try:
         import astra  # noqa: F401

@@ -10,8 +10,8 @@ import tifffile
 
 from labsim.campaign import read_scan
 from labsim.ct import open_stack, reduce_scan
-from labsim.ct.neighbours import find_bright_jumps, find_doubled
 from labsim.ct.phantom import Phantom
+from labsim.ct.slices.neighbours import find_bright_jumps, find_doubled
 from labsim.errors import MeasurementError
 
 DATA = Path(__file__).parents[2] / "data" / "ct" / "labelled_scans"

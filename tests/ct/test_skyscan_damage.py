@@ -9,7 +9,7 @@ import pytest
 import tifffile
 
 from labsim.ct.formats.images import read_rescale
-from labsim.ct.skyscan import check_log, read_log
+from labsim.ct.slices.skyscan import check_log, read_log
 from labsim.errors import MeasurementError
 
 LOG = (

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
-from labsim.diagnosis import free_law
 from labsim.diagnosis.campaign import judge_campaign
-from labsim.diagnosis.free_law import EMBEDDED, Tangents, average, gather, integrate, is_wanted
 from labsim.diagnosis.gain import predict_held_out
-from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, make_hats
-from labsim.diagnosis.learned_law import learn_law
-from labsim.diagnosis.unknown import FREEDOMS
+from labsim.diagnosis.unlisted import free_law
+from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate, is_wanted
+from labsim.diagnosis.unlisted.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, make_hats
+from labsim.diagnosis.unlisted.learned_law import learn_law
+from labsim.diagnosis.unlisted.unknown import FREEDOMS
 from labsim.effects import Place, list_effects
 from labsim.effects.terms import combine
 from labsim.inference.fits.blocks import Block, solve_globals

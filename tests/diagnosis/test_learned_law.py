@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labsim.diagnosis.free_law import Tangents, gather
-from labsim.diagnosis.hats import DEPTHS, PRESSURE, SPEEDS, STEP, FreeLaw
-from labsim.diagnosis.learned_law import USUAL, find_peak, make_effect, share_hats, weigh_formulas
+from labsim.diagnosis.unlisted.free_law import Tangents, gather
+from labsim.diagnosis.unlisted.hats import DEPTHS, PRESSURE, SPEEDS, STEP, FreeLaw
+from labsim.diagnosis.unlisted.learned_law import USUAL, find_peak, make_effect, share_hats, weigh_formulas
 from labsim.effects.terms import add_term, list_terms
 from labsim.inference.fits.blocks import Block
 from labsim.records import Material, Projectile

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from labsim.diagnosis.prediction import Prediction
-from labsim.diagnosis.summary import bound_probability, judge_predictions
+from labsim.diagnosis.published.campaign import bound_probability, judge_predictions
+from labsim.diagnosis.published.prediction import Prediction
 
 RANDOM = np.random.default_rng(3)
 

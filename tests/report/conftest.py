@@ -11,7 +11,7 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
-from labsim.diagnosis.summary import diagnose_summary
+from labsim.diagnosis.published.campaign import diagnose_summary
 from labsim.inference.calibrate import calibrate
 from labsim.inference.published.calibrate import calibrate_summary
 from labsim.report.outputs import write_result

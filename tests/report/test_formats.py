@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from labsim.cli import app
-from labsim.report.formats import further_formats
-from labsim.report.look import new_figure
+from labsim.report.figures.formats import further_formats
+from labsim.report.figures.look import new_figure
 
 
 def draw(path: Path) -> None:

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from labsim.diagnosis.free_law import RecoveredLaw
-from labsim.diagnosis.hats import FreeLaw
+from labsim.diagnosis.unlisted.free_law import RecoveredLaw
+from labsim.diagnosis.unlisted.hats import FreeLaw
 from labsim.effects.terms import list_terms
-from labsim.report.law_figures import draw_laws, plot_law, trace_law
+from labsim.report.figures.laws import draw_laws, plot_law, trace_law
 
 SPEED = FreeLaw("force of speed", "speed", "m/s", (0.0, 0.3, 1.2), (0.3, 1.2), (0.0, 1.0), "Pa", 400.0)
 DUST = (0.18, 0.21, 0.25)

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from labsim.diagnosis.free_law import RecoveredLaw
-from labsim.diagnosis.hats import FreeLaw
 from labsim.diagnosis.judge import Verdict
 from labsim.diagnosis.misfit import Part
+from labsim.diagnosis.unlisted.free_law import RecoveredLaw
+from labsim.diagnosis.unlisted.hats import FreeLaw
 from labsim.report.campaign_tables import say_verdict
-from labsim.report.law_words import say_missing, size_of_missing
+from labsim.report.pages.law_words import say_missing, size_of_missing
 
 DEPTH = FreeLaw(
     "force of depth", "depth", "tip radii", (0.0, 1.0, 2.0), (0.0, 1.0, 2.0), (0.0, 2.0), "Pa", 400.0

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from labsim import __version__
-from labsim.report.interactive import SIGNS, SYMBOLS
-from labsim.report.phrases import say_interval, say_p_value, say_probability
+from labsim.report.figures.interactive import SIGNS, SYMBOLS
+from labsim.report.pages.phrases import say_interval, say_p_value, say_probability
 from labsim.sph import solver_hash
 
 SECTIONS = "measurement calibration drops causes confusable gain next numerics warnings made".split()
@@ -180,7 +180,7 @@ def test_maps_stand_side_by_side_with_their_difference(unknown: Path) -> None:
 
 
 def test_bands_hold_what_a_true_model_leaves(effect_found) -> None:  # type: ignore[no-untyped-def]
-    from labsim.report.drop_views import view_drops
+    from labsim.report.pages.drop_views import view_drops
 
     views = view_drops(effect_found.bench, [("nominal", effect_found.nominal), ("true", effect_found.best)])
     assert any(view.stands_out("nominal") for view in views)

@@ -3,7 +3,7 @@
 import pytest
 
 from labsim.effects import list_effects
-from labsim.report.phrases import say_amount
+from labsim.report.pages.phrases import say_amount
 
 
 @pytest.mark.parametrize(

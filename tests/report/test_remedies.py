@@ -7,7 +7,7 @@ import pytest
 
 from labsim.diagnosis.next_experiment import Suggestion
 from labsim.effects import list_effects
-from labsim.report.remedies import BY_KIND, say_remedy
+from labsim.report.pages.remedies import BY_KIND, say_remedy
 
 EFFECTS = list_effects()
 

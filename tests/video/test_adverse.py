@@ -7,7 +7,7 @@ import pytest
 
 from labsim.errors import MeasurementError
 from labsim.video import Tracking, follow_projectile
-from labsim.video.scene import survey_scene
+from labsim.video.picture.scene import survey_scene
 from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 
 CONTACT, COUNT = 45.5, 90

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from labsim.campaign import read_campaign
 from labsim.inference.observations.observe import read_observed_track
 from labsim.records import Camera, DecelerationCurve, Track
-from labsim.video.contact_row import find_surface_row
-from labsim.video.curve import fit_deceleration
+from labsim.video.motion.contact_row import find_surface_row
+from labsim.video.motion.curve import fit_deceleration
 
 RATE, PIXEL, RADIUS = 10_000.0, 20e-6, 0.5e-3
 CAMERA = Camera(RATE, PIXEL, 300.0, 0.15)
@@ -73,7 +73,7 @@ def test_a_curve_that_is_known_is_not_fitted_again(monkeypatch: pytest.MonkeyPat
         fits.append(given)
         return fit_deceleration(*given)
 
-    monkeypatch.setattr("labsim.video.contact_row.fit_deceleration", count)
+    monkeypatch.setattr("labsim.video.motion.contact_row.fit_deceleration", count)
     assert find_surface_row(track, camera, RADIUS, curve) == wanted
     without = len(fits)
     assert find_surface_row(track, camera, RADIUS) == wanted and len(fits) - without == without + 1

@@ -17,10 +17,10 @@ import tifffile
 from labsim.errors import LabsimError, MeasurementError
 from labsim.records import Measured
 from labsim.video import follow_projectile, measure_ruler, open_frames, scale_from_diameter
-from labsim.video.noise import Noise
-from labsim.video.registration import register
+from labsim.video.picture.noise import Noise
+from labsim.video.projectile.registration import register
+from labsim.video.projectile.template import MARGIN, Template
 from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
-from labsim.video.template import MARGIN, Template
 
 DATA = Path(__file__).parents[2] / "data" / "video"
 

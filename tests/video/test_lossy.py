@@ -14,7 +14,7 @@ from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 @pytest.mark.parametrize(("size", "codec"), [(8, "mjpg"), (16, "h264")])
 def test_noise_shared_in_blocks(monkeypatch, size, codec) -> None:
     """Blocks that err as a whole: the widening is measured from single frames, to 30 % of what the rows truly scatter."""
-    from labsim.video import rod
+    from labsim.video.projectile import rod
 
     factors = []
     measure = rod.measure_widening

@@ -9,7 +9,7 @@ import pytest
 
 from labsim.records import Camera, Track
 from labsim.video import fit_deceleration
-from labsim.video.outliers import follow_median, guess_spikes
+from labsim.video.motion.outliers import follow_median, guess_spikes
 from labsim.video.synthetic import evaluate_motion
 
 RATE, PIXEL = 10_000.0, 20e-6

@@ -16,7 +16,7 @@ import pytest
 from labsim.errors import MeasurementError
 from labsim.records import Camera
 from labsim.video import fit_deceleration, follow_projectile, open_frames
-from labsim.video.direction import straighten
+from labsim.video.picture.direction import straighten
 from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
 
 DATA = Path(__file__).parents[2] / "data" / "video"

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 
 from ...errors import MeasurementError
-from ..stack import SliceStack
+from ..slices.stack import SliceStack
 
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".nx", ".nxs")
 
@@ -36,7 +36,9 @@ def _open_volume(path: Path, file: h5py.File) -> SliceStack:
         raise MeasurementError(path, "exchange/data", "holds no numbers; DXchange keeps the volume there")
     if "exchange/theta" in file or "exchange/data_white" in file:
         raise MeasurementError(
-            path, "exchange/data", "holds projections, not slices; labsim.ct.reconstruct makes slices of them"
+            path,
+            "exchange/data",
+            "holds projections, not slices; labsim.ct.slices.reconstruct makes slices of them",
         )
     if data.ndim != 3 or data.shape[0] < 8:
         raise MeasurementError(

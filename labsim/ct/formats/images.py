@@ -13,8 +13,8 @@ from PIL import Image
 
 from ...errors import LabsimError, MeasurementError
 from ...tiff_pages import check_size, count_pages
-from ..skyscan import check_log, find_log, read_log
-from ..stack import SliceStack
+from ..slices.skyscan import check_log, find_log, read_log
+from ..slices.stack import SliceStack
 
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp")
 

@@ -9,7 +9,7 @@ import tifffile
 
 from ...errors import MeasurementError
 from ...tiff_pages import count_pages
-from ..stack import SliceStack
+from ..slices.stack import SliceStack
 
 
 def recognises(path: Path) -> bool:

@@ -1,6 +1,6 @@
 """What a campaign measured, as the likelihood sees it: positions with their errors, maps with theirs.
 
-Input: a Campaign. Output: Observed. Positions are never differentiated. Each drop's own curve (labsim.video.curve) only says
+Input: a Campaign. Output: Observed. Positions are never differentiated. Each drop's own curve (video/motion/curve.py) only says
 which frames belong to the motion, and where the search for contact time and impact speed starts.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import MeasurementError
 from ...records import Campaign, DecelerationCurve, Drop, FloatArray, Track
-from ...video.curve import fit_deceleration
+from ...video.motion.curve import fit_deceleration
 from ...video.track_file import read_track
 from .observe_acceleration import ObservedImpact, observe_impact
 from .observe_push import ObservedPush, observe_push

@@ -1,0 +1,1 @@
+"""Slices, one at a time: read, reconstructed, checked and freed of artefacts."""

@@ -1,0 +1,1 @@
+"""Diagnosis of published figures in place of records."""

@@ -1,0 +1,1 @@
+"""What no listed cause explains: its evidence, the free law it would be, and a formula for that."""

@@ -1,0 +1,242 @@
+"""A free law where the equations have a place for it: in the strength of the dust and in the force on the projectile.
+
+    m d²z/dt² = m g - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
+
+h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. What every hat changes of drops
+and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian
+about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/free-law.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import truncnorm
+
+from ...inference.emulation.nodes import amplitude_nodes, place_strength
+from ...inference.fits.blocks import Block, solve_globals
+from ...inference.fits.evidence import log_share_inside
+from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
+from ...inference.fits.steps import move_nuisances
+from ...inference.fits.tangents import linearise_at
+from ...inference.workbench import Workbench
+from ...records import FloatArray
+from ...runs.parts import Push
+from ..screen import has_runs
+from .hats import FreeLaw, list_laws, make_hats
+
+AHEAD = 10.0  # so much, in ln evidence, before a law that has no place in the equations
+# of the unit. A law of 3 to 24 % all along the way moves depths by 1 to 8 %; one hat is a fourth of the way
+SIZES = (0.1, 0.2, 0.4, 0.8)
+# of what a law changes of the depth: error of a response known at one amplitude. A force of 320 Pa at one tip radius changes ln D
+# by 0.08 to 0.13 where runs at 120 Pa, in proportion, say 0.13 to 0.14
+ONE_AMPLITUDE = 0.15
+CLEAR = 3.0  # standard deviations from which a hat larger than its step is simulated about its estimate too
+MOST_BENT = 3  # such hats in a round
+ANYWHERE = (-1e3, 1e3)  # limits of ln p_m that are none
+ROUNDS = 2  # of Gauss and Newton about the law that is found
+EMBEDDED = {  # freedom -> the laws that are free together
+    "strength of filling factor": ("strength of filling factor",),
+    "force of depth": ("force of depth",),
+    "force of speed": ("force of speed",),
+    "strength and forces": ("strength of filling factor", "force of depth", "force of speed"),
+}
+
+
+@dataclass(frozen=True)
+class RecoveredLaw:
+    """What the data say of one free law. mean : (k,) at its knots in value_unit; covariance : (k, k)."""
+
+    law: FreeLaw
+    mean: FloatArray
+    covariance: FloatArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        return np.sqrt(np.diag(self.covariance))
+
+    def at(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The law and its standard deviation: linear between knots, constant beyond."""
+        grid, knots = np.array(self.law.grid), np.array(self.law.knots)
+        weights = np.stack([np.interp(place, grid, (grid == knot).astype(float)) for knot in knots], axis=1)
+        return weights @ self.mean, np.sqrt(np.einsum("nk,kl,nl->n", weights, self.covariance, weights))
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """Whitened products of all data about a law. names : ln_p_m, then hats; gram : (2 + k, 2 + k) with the residual of no law
+    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude; log_p_m : there."""
+
+    laws: tuple[FreeLaw, ...]
+    names: tuple[str, ...]
+    gram: FloatArray
+    log_determinant: float
+    points: int
+    drops: FloatArray
+    log_p_m: float
+
+    def of_drops(self, hats: Sequence[str]) -> FloatArray:
+        """Tangents (n, k) of these hats."""
+        return self.drops[:, [self.names.index(name) - 1 for name in hats]]
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """One size of some laws, integrated. coefficients : ln p_m first, then hats in the order asked, in units of their scales."""
+
+    evidence: float
+    coefficients: FloatArray
+    covariance: FloatArray
+
+
+def is_wanted(p_value: float, rivals: Sequence[Fit], without_place: float, predicted: float = 1.0) -> bool:
+    """Whether a law in the equations can matter: the nominal model fails, and no listed cause fits, predicts held-out drops
+    (``predicted``, p value of the best) and stands far ahead of ``without_place``, ln evidence of the laws that cost no runs."""
+    best = max(rivals, key=lambda fit: fit.evidence, default=None)
+    if p_value >= REJECTED:
+        return False
+    if best is None or best.evidence < without_place + AHEAD:
+        return True
+    return min(goodness_of_fit(best), predicted) < DOUBTFUL
+
+
+def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
+    """Runs of every hat by itself, then all data about the best law that they find; a hat whose runs fail is left out.
+
+    Logarithms of depth and time are what hats change, in proportion to their coefficients, large and clear ones along
+    further runs; p_m moves along its own.
+    """
+    laws = list_laws(bench, fit)
+    index = round(place_strength(fit.log_p_m))  # not screening's, which may lie where soft dust costs most
+    bench.require_base([index])
+    deepest = {
+        run.setting: run.penetration_depth
+        for number in range(len(bench.families))
+        for run in bench.grid.stopped_runs("", index, None, number) or ()
+        if not isinstance(run, Push)
+    }
+    hats = {name: hat for law in laws for name, hat in make_hats(law, deepest).items()}
+    # shares tables, runs and what they hold
+    terms = replace(bench.terms, numerical_change=ONE_AMPLITUDE)
+    free = replace(bench, effects={**bench.effects, **hats}, terms=terms)
+    # at every speed: what a force at some depth changes has a peak where drops end there
+    free.require_changes([(name, hat.amplitudes[0].step, index) for name, hat in hats.items()], "free law")
+    names = [name for name in hats if has_runs(bench, name)]
+    scales = {hat: law.scale for law in laws for hat in law.hats}
+    kept = tuple(
+        replace(law, knots=tuple(knot for knot, hat in zip(law.knots, law.hats, strict=True) if hat in names))
+        for law in laws
+    )
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    nuisances, log_p_m = fit.nuisances, fit.log_p_m
+    values = dict.fromkeys(names, 0.0)
+    for rounds in range(ROUNDS + 1):
+        bench.require_base_about(log_p_m)
+        blocks = linearise_at(free, nuisances, log_p_m, {**fit.values, **values})
+        gram, log_determinant, points = gather(blocks, names, scales, values)
+        drops = np.stack([blocks[0].tangents[name] * scales[name] for name in names], axis=1)
+        found = Tangents(kept, ("ln_p_m", *names), gram, log_determinant, points, drops, log_p_m)
+        if rounds == ROUNDS:
+            break
+        own, size = max(
+            ((choose_hats(found, freedom), size) for freedom in EMBEDDED for size in SIZES),
+            key=lambda each: integrate(found, each[0], each[1], (low, high)).evidence,
+        )
+        priors = {name: (values[name], size * scales[name]) for name in own}
+        step, covariance, _, _, weighted = solve_globals(blocks, ["ln_p_m", *own], priors)
+        before, log_p_m = log_p_m, float(np.clip(log_p_m + np.clip(step[0], -0.7, 0.7), low, high))
+        # the others' best where p_m stops short of its own
+        step += covariance[0] / covariance[0, 0] * (log_p_m - before - step[0])
+        best = {name: values[name] + float(part) for name, part in zip(own, step[1:], strict=True)}
+        values = dict.fromkeys(names, 0.0) | best
+        sigma = np.sqrt(np.diag(covariance)[1:])
+        clear = {
+            name: abs(best[name]) / width
+            for name, width in zip(own, sigma, strict=True)
+            if abs(best[name]) > max(CLEAR * width, hats[name].amplitudes[0].step)
+        }
+        bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
+        nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], coarse=True)]
+        free.require_changes(nodes, "free law, large")
+        nuisances, _ = move_nuisances(bench, nuisances, blocks, weighted)
+    return found
+
+
+def choose_hats(found: Tangents, freedom: str) -> list[str]:
+    """Hats of the laws that are free together."""
+    return [hat for law in found.laws if law.name in EMBEDDED[freedom] for hat in law.hats]
+
+
+def gather(
+    blocks: Sequence[Block],
+    names: Sequence[str],
+    scales: Mapping[str, float],
+    values: Mapping[str, float] | None = None,
+) -> tuple[FloatArray, float, int]:
+    """Gram matrix of whitened (residual, ln p_m, hats per unit coefficient), ln det C, number of data.
+
+    values : amplitudes that the blocks are linearised about; the residual is that of none, by the tangents there.
+    """
+    gram, log_determinant, points = np.zeros((2 + len(names),) * 2), 0.0, 0
+    for block in blocks:
+        residual = block.residual + sum(
+            block.tangents[name] * value for name, value in (values or {}).items()
+        )
+        columns = [residual, block.tangents["ln_p_m"], *(block.tangents[n] * scales[n] for n in names)]
+        white = block.whiten(np.stack(columns, axis=1))
+        gram += white.T @ white
+        log_determinant += block.log_determinant
+        points += block.residual.size
+    return gram, log_determinant, points
+
+
+def integrate(
+    found: Tangents, hats: Sequence[str], size: float, limits: tuple[float, float] = ANYWHERE
+) -> Marginal:
+    """Evidence and posterior with Gaussian coefficients of this size and ln p_m flat between limits.
+
+    Evidence without the limits is that of the covariance C + size² T Tᵀ over all data at once, by the matrix inversion lemma.
+    """
+    own = [found.names.index("ln_p_m"), *(found.names.index(name) for name in hats)]
+    places = np.array(own) + 1
+    information = found.gram[np.ix_(places, places)] + np.diag([0.0] + [size**-2] * len(hats))
+    factor = cho_factor(information, lower=True)
+    towards = found.gram[places, 0]
+    best, covariance = cho_solve(factor, towards), cho_solve(factor, np.eye(len(own)))
+    chi_square = found.gram[0, 0] - towards @ best
+    log_information = 2 * float(np.sum(np.log(np.diag(factor[0]))))
+    evidence = -0.5 * (chi_square + found.log_determinant + (found.points - 1) * math.log(2 * math.pi))
+    evidence -= 0.5 * log_information + len(hats) * math.log(size) + math.log(limits[1] - limits[0])
+    low, high = (limit - found.log_p_m for limit in limits)
+    sigma = math.sqrt(covariance[0, 0])
+    evidence += log_share_inside(low, high, best[0], sigma)
+    # a Gaussian cut in its first coordinate: the others follow that one's mean and variance
+    cut = truncnorm((low - best[0]) / sigma, (high - best[0]) / sigma)
+    along = covariance[0] / sigma
+    best = best + along * cut.mean()
+    return Marginal(float(evidence), best, covariance + np.outer(along, along) * (cut.var() - 1.0))
+
+
+def average(laws: Sequence[FreeLaw], each: Sequence[Marginal]) -> tuple[tuple[RecoveredLaw, ...], FloatArray]:
+    """Laws over the sizes by their evidence, and the mean (1 + k,) of the coefficients."""
+    top = max(one.evidence for one in each)
+    weights = np.exp([one.evidence - top for one in each])
+    weights /= weights.sum()
+    mean = np.sum([w * one.coefficients for w, one in zip(weights, each, strict=True)], axis=0)
+    covariance = np.sum(
+        [
+            w * (one.covariance + np.outer(one.coefficients - mean, one.coefficients - mean))
+            for w, one in zip(weights, each, strict=True)
+        ],
+        axis=0,
+    )
+    recovered, at = [], 1
+    for law in laws:
+        own = slice(at, at + len(law.knots))
+        at = own.stop
+        recovered.append(RecoveredLaw(law, mean[own] * law.scale, covariance[own, own] * law.scale**2))
+    return tuple(recovered), mean

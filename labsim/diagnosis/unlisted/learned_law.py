@@ -1,0 +1,179 @@
+"""A short formula for what no listed cause explains: chosen among all terms, simulated, refitted, tested on held-out drops.
+
+What terms of effects/terms/ would change is known from the hats of the free law (free_law.py): a term is a combination of them.
+All single terms and pairs are weighed so, to first order; the best few become effects for this one campaign, are simulated and
+fitted as any cause is. Formulas and figures: docs/learned-law.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from ...effects import Effect, Normal, Parameter
+from ...effects.terms import KNOTS, Term, add_term, list_terms
+from ...errors import LabsimError
+from ...inference.fits.fitting import Fit, fit_hypothesis
+from ...inference.workbench import Workbench
+from ...records import Campaign, FloatArray
+from ...sph import DropSetting
+from ..gain import Gain, HeldOut, measure_gain, predict_held_out
+from ..pairs import LEAST_GAIN
+from .free_law import SIZES, Marginal, Tangents, integrate
+from .hats import STEP, FreeLaw
+from .unknown import log_mean
+
+USUAL = 0.4  # of a law's unit: standard deviation of a coefficient's prior where its term is largest, the middle of SIZES
+MOST_SIMULATED = 4  # formulas
+ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Some terms as a fit of their own runs. gain : over the nominal model, on drops held out of both fits."""
+
+    terms: tuple[Term, ...]
+    fit: Fit
+    held_out: HeldOut
+    gain: Gain
+
+    @property
+    def coefficients(self) -> FloatArray:
+        return np.array([self.fit.values[term.name] for term in self.terms])
+
+    @property
+    def sigma(self) -> FloatArray:
+        return np.sqrt(np.diag(self.fit.covariance)[1:])
+
+
+@dataclass(frozen=True)
+class LearnedLaw:
+    """formulas : those that were simulated, the one with most evidence first; bench : with their terms among its effects."""
+
+    formulas: tuple[Formula, ...]
+    bench: Workbench
+
+    @property
+    def best(self) -> Formula:
+        return self.formulas[0]
+
+    @property
+    def alike(self) -> list[Formula]:
+        """The others that this campaign hardly tells from the best."""
+        return [each for each in self.formulas[1:] if each.fit.evidence > self.best.fit.evidence - ALIKE]
+
+
+def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOut) -> LearnedLaw | None:
+    """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
+    and gives held-out drops a higher probability.
+
+    before : the nominal model's predictions of held-out drops.
+    """
+    laws = {law.name: law for law in tangents.laws if law.knots}
+    # an effect of that name has been tried as a cause
+    terms = {n: term for n, term in list_terms().items() if term.place in laws and n not in bench.effects}
+    peaks = {name: find_peak(term, laws[term.place]) for name, term in terms.items()}
+    terms = {name: term for name, term in terms.items() if peaks[name] > 0}
+    effects = {name: make_effect(term, laws[term.place].scale / peaks[name]) for name, term in terms.items()}
+    free = replace(bench, effects={**bench.effects, **effects})
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    formulas = []
+    for names, marginal in weigh_formulas(tangents, terms, peaks, (low, high))[:MOST_SIMULATED]:
+        units = [laws[terms[name].place].scale / peaks[name] for name in names]
+        values = {
+            name: float(c) * unit
+            for name, c, unit in zip(names, marginal.coefficients[1:], units, strict=True)
+        }
+        start = tangents.log_p_m + float(marginal.coefficients[0])
+        try:
+            fit = fit_hypothesis(free, names, (start, values), nuisances=nominal)
+        except LabsimError:
+            continue  # its runs fail: no formula for this dust
+        if fit.evidence > nominal.evidence + LEAST_GAIN:
+            held_out = predict_held_out(free, fit)
+            gain = measure_gain(before, held_out)
+            if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
+                formulas.append(Formula(tuple(terms[name] for name in names), fit, held_out, gain))
+    if not formulas:
+        return None
+    return LearnedLaw(tuple(sorted(formulas, key=lambda each: -each.fit.evidence)), free)
+
+
+def find_peak(term: Term, law: FreeLaw) -> float:
+    """The largest value of a term's shape between what the data reach, which may lie between knots or before the last."""
+    return float(np.max(np.abs(shape_at(term, law, np.linspace(*law.reach, KNOTS)))))
+
+
+def share_hats(term: Term, law: FreeLaw) -> FloatArray:
+    """Heights of the law's hats whose sum is nearest to the term. Its values at the knots are not: a film between two is lost."""
+    places = np.linspace(law.grid[0], max(law.knots), KNOTS)
+    hats = [np.interp(places, law.grid, [float(place == knot) for place in law.grid]) for knot in law.knots]
+    heights: FloatArray = np.linalg.lstsq(np.stack(hats, axis=1), shape_at(term, law, places), rcond=None)[0]
+    return heights
+
+
+def shape_at(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:
+    """A term at places of a law; it takes compaction where the law goes with the filling factor."""
+    return term.shape(places - law.grid[0] if law.over == "filling factor" else places)
+
+
+def weigh_formulas(
+    tangents: Tangents, terms: Mapping[str, Term], peaks: Mapping[str, float], limits: tuple[float, float]
+) -> list[tuple[tuple[str, ...], Marginal]]:
+    """Terms by themselves and in pairs, those with most evidence first; a pair only where it promises LEAST_GAIN over its better
+    part, and over nothing. Coefficients are in units of the law where the term is largest; one on the wrong side of a limit is
+    refused."""
+    laws = {law.name: law for law in tangents.laws}
+    columns = np.zeros((len(tangents.gram), 2 + len(terms)))
+    columns[0, 0] = columns[1, 1] = 1.0
+    for k, (name, term) in enumerate(terms.items(), start=2):
+        law = laws[term.place]
+        for hat, share in zip(law.hats, share_hats(term, law) / peaks[name], strict=True):
+            columns[tangents.names.index(hat) + 1, k] = share
+    gram = columns.T @ tangents.gram @ columns
+    reduced = replace(tangents, names=("ln_p_m", *terms), gram=gram)
+
+    def weigh(names: Sequence[str]) -> tuple[float, Marginal]:
+        each = [integrate(reduced, names, size, limits) for size in SIZES]
+        return log_mean([one.evidence for one in each]), max(each, key=lambda one: one.evidence)
+
+    def allowed(names: Sequence[str], marginal: Marginal) -> bool:
+        signs = zip(names, marginal.coefficients[1:], strict=True)
+        return all(terms[name].limits[0] < 0.0 if c < 0 else terms[name].limits[1] > 0.0 for name, c in signs)
+
+    nothing, _ = weigh(())
+    weighed: dict[tuple[str, ...], tuple[float, Marginal]] = {}
+    for names in [(name,) for name in terms] + list(combinations(terms, 2)):
+        evidence, marginal = weigh(names)
+        parts = [weighed[part,][0] for part in names if (part,) in weighed]
+        if allowed(names, marginal) and (len(names) == 1 or evidence > max([nothing, *parts]) + LEAST_GAIN):
+            weighed[names] = evidence, marginal
+    ranked = sorted(weighed, key=lambda names: -weighed[names][0])
+    return [(names, weighed[names][1]) for names in ranked]
+
+
+def make_effect(term: Term, unit: float) -> Effect:
+    """A term as an effect of one campaign. unit : coefficient that changes as much as the free law's unit where it is largest."""
+    low, high = (min(max(limit, -1e9), 1e9) for limit in term.limits)
+    parameter = Parameter(
+        "coefficient", term.unit, 0.0, (low, high), Normal(0.0, USUAL * unit), STEP * unit, "of the free law's unit"
+    )  # fmt: skip
+
+    def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:
+        return add_term(setting, term, values["coefficient"])
+
+    return Effect(
+        term.name, term.title, "material", (parameter,), "", (term.source,), {}, Path(__file__), lambda campaign: "",
+        change, None, partial(_give, (parameter,)),
+    )  # fmt: skip
+
+
+def _give(parameters: tuple[Parameter, ...], campaign: Campaign) -> tuple[Parameter, ...]:
+    """The parameters of one term, the same in every campaign."""
+    return parameters

@@ -1,0 +1,175 @@
+"""The hypothesis that something is wrong which no listed cause explains: a smooth force law without a name.
+
+It competes with the causes on equal terms: residuals are a Gaussian process, orthogonal to nothing, whose size is
+integrated over a few values. What may deviate stands in FREEDOMS: a force law smooth over the way into the dust, speed and size;
+every drop by its own offset; the layering of undisturbed dust. Where the nominal model fails, laws that stand in the equations of
+motion compete too (EMBEDDED, free_law.py): what they find is drawn as the shape of what is missing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...inference.fits.blocks import Block, solve_globals
+from ...inference.fits.evidence import log_share_inside
+from ...inference.fits.fitting import Fit
+from ...inference.workbench import Workbench
+from ...records import FloatArray
+from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
+from .free_law import SIZES as LAW_SIZES
+
+SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth
+MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map, or the undisturbed dust, by 3 %
+
+
+DUST = "undisturbed dust"
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What may deviate. scales : of the law over (fraction of the way, ln speed, ln size), None where drops may not deviate;
+    kinds : of the other observations that may."""
+
+    scales: tuple[float, float, float] | None
+    kinds: frozenset[str]
+
+
+FREEDOMS = {
+    "depth and speed": Freedom((0.35, 0.5, 0.5), frozenset({"map"})),
+    "drop": Freedom((1.0, 1e-3, 1e-3), frozenset({"map"})),
+    "undisturbed dust": Freedom(None, frozenset({DUST})),
+    "depth and speed and undisturbed dust": Freedom((0.35, 0.5, 0.5), frozenset({"map", DUST})),
+}
+
+
+@dataclass(frozen=True)
+class UnknownFit:
+    """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean per datum of the drops, m.
+
+    evidences : of every freedom, over its sizes; laws : what the data say of the laws of the best freedom that stands in the
+    equations, ``embedded``; empty where none was tried. tangents : of all hats, where embedded laws were tried.
+    """
+
+    evidence: float
+    block: str
+    size: float
+    law: FloatArray
+    evidences: dict[str, float]
+    embedded: str = ""
+    laws: tuple[RecoveredLaw, ...] = ()
+    tangents: Tangents | None = None
+
+
+def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) -> UnknownFit:
+    """Evidence of the nominal model plus a free law, at the nominal linearisation.
+
+    tangents : of embedded laws, where those compete.
+    """
+    drops, kinds = fit.drops, [each.kind for each in bench.observations]
+    coordinates = law_coordinates(bench, fit)
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    n = sum(block.residual.size for block in fit.blocks)
+    terms: dict[str, list[float]] = {}
+    best: tuple[float, str, float, FloatArray] | None = None
+    for name, freedom in FREEDOMS.items():
+        if DUST in freedom.kinds and DUST not in kinds:
+            continue
+        shape = law_covariance(coordinates, freedom.scales) if freedom.scales else None
+        for size in SIZES:
+            free = [loosen(Block(drops.residual, drops.covariance, drops.tangents, shape), size)]
+            free += [
+                loosen(block, MAP_SHARE * size * (kind in freedom.kinds))
+                for kind, block in zip(kinds[1:], fit.blocks[1:], strict=True)
+            ]
+            step, variance, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
+            evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
+            evidence += 0.5 * math.log(2 * math.pi) + 0.5 * math.log(variance[0, 0]) - math.log(high - low)
+            moved = fit.log_p_m + float(step[0])
+            evidence += log_share_inside(low, high, moved, math.sqrt(variance[0, 0]))
+            terms.setdefault(name, []).append(evidence)
+            if best is None or evidence > best[0]:
+                law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(drops.residual.size)
+                best = (evidence, name, size, law)
+    embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
+    for name, places in EMBEDDED.items():
+        if tangents is None:
+            break
+        own = [law for law in tangents.laws if law.name in places and law.knots]
+        hats = choose_hats(tangents, name)
+        if not hats:
+            continue
+        each = [integrate(tangents, hats, size, (low, high)) for size in LAW_SIZES]
+        terms[name] = [one.evidence for one in each]
+        embedded[name], mean = average(own, each)
+        top = max(each, key=lambda one: one.evidence)
+        if best is None or top.evidence > best[0]:
+            best = (
+                top.evidence,
+                name,
+                LAW_SIZES[each.index(top)],
+                tangents.of_drops(hats) @ mean[1:],
+            )
+    assert best is not None
+    evidences = {name: log_mean(values) for name, values in terms.items()}
+    nearest = max(embedded, key=lambda name: evidences[name], default="")
+    laws = embedded.get(nearest, ())
+    return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, laws, tangents)
+
+
+def log_mean(values: Collection[float]) -> float:
+    """ln of the mean of what these are the logarithms of."""
+    top = max(values)
+    return top + math.log(sum(math.exp(value - top) for value in values) / len(values))
+
+
+def loosen(block: Block, size: float) -> Block:
+    """The block with its free covariance, of this size, among its errors."""
+    if block.free is None or size == 0.0:
+        return block
+    return replace(block, covariance=block.covariance + size**2 * block.free)
+
+
+def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
+    """Per datum: depth reached (m; of an accelerometer the acceleration, m/s²), fraction of the way,
+    ln of speed² over radius, ln radius, ln mass per radius³."""
+    parts: dict[str, list[FloatArray]] = {
+        "reached": [],
+        "fraction": [],
+        "speed": [],
+        "radius": [],
+        "mass": [],
+    }
+    tracks = bench.tracks
+    for model, instant in zip(tracks.models, tracks.instants(fit.nuisances[0]), strict=True):
+        section = fit.drops.sections[model.observed.name]
+        n = section.stop - section.start
+        reached = np.zeros(n)
+        reached[: model.size.size] = model.size
+        fraction = np.zeros(n)
+        fraction[: model.way.size] = model.way
+        parts["reached"].append(reached)
+        parts["fraction"].append(fraction)
+        mass = model.observed.drop.projectile.mass
+        for key, value in (
+            ("speed", instant.log_speed - 0.5 * math.log(model.radius)),
+            ("radius", math.log(model.radius)),
+            ("mass", math.log(mass / model.radius**3)),
+        ):
+            parts[key].append(np.full(n, value))
+    return {key: np.concatenate(values) for key, values in parts.items()}
+
+
+def law_covariance(at: dict[str, FloatArray], scales: tuple[float, float, float]) -> FloatArray:
+    """Unit-size covariance, m², of a law smooth over (fraction of the way, speed, size and mass)."""
+    along, speed, size = scales
+    distance = (
+        (np.subtract.outer(at["fraction"], at["fraction"]) / along) ** 2
+        + (np.subtract.outer(at["speed"], at["speed"]) / speed) ** 2
+        + (np.subtract.outer(at["radius"], at["radius"]) / size) ** 2
+        + (np.subtract.outer(at["mass"], at["mass"]) / (2 * size)) ** 2
+    )
+    return np.outer(at["reached"], at["reached"]) * np.exp(-0.5 * distance)

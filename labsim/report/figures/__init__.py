@@ -1,0 +1,1 @@
+"""Pictures: records in, PNG files or figures to hover over out."""

@@ -1,0 +1,252 @@
+"""What is said of the law that an unknown cause would have to be: a phrase for the verdict, numbers for diagnosis.json."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...diagnosis.campaign import Diagnosis
+from ...diagnosis.judge import PREDICTED
+from ...diagnosis.unlisted.free_law import EMBEDDED, RecoveredLaw
+from ...diagnosis.unlisted.learned_law import Formula
+from .page import show_number
+
+MISSING = {
+    "depth and speed": "a law of depth and speed, about {size} % of the depth",
+    "drop": "something that changes from drop to drop, about {size} % of the depth",
+    "undisturbed dust": "a layering of the dust that was there before the drop",
+    "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
+    "speed, about {size} % of the depth",
+}
+PLACE_WORDS = {
+    "strength of filling factor": "a compressive strength that is more than p_m gives by a share of",
+    "force of depth": "a force upwards on the tip, over its cross-section, of",
+    "force of speed": "a force against the motion, over the tip's cross-section, of",
+}
+CLEAR = 2.0  # standard deviations from which a further law of several is named
+
+
+def is_embedded(found: Diagnosis) -> bool:
+    """Whether the best free law stands in the equations of motion."""
+    return found.unknown.block in EMBEDDED
+
+
+def say_missing(found: Diagnosis) -> str:
+    """What the unnamed law of the best fit does, or depends on, and how large it is; after ``what is missing``."""
+    unknown, parts = found.unknown, found.misfit
+    missed = [part.name for part in parts if part.missed]
+    if missed and not any(part.missed for part in parts if part.kind == "drops"):
+        return f"shows in {' and '.join(missed)} alone: p_m explains the drops"
+    if found.learned is not None:
+        return f"is like {say_formula(found.learned.best)}"
+    if not is_embedded(found):
+        return "looks like " + MISSING[unknown.block].format(size=f"{100 * unknown.size:.0f}")
+    first, *rest = _rank(found)
+    further = [f"a {law.law.name}" for law in rest if _clearness(law) > CLEAR]
+    return f"acts like {say_law(first)}" + (f" (with parts of {' and '.join(further)})" if further else "")
+
+
+def comes_nearest(found: Diagnosis) -> bool:
+    """Whether a listed cause explains more than any law without a name, and is set back because held-out drops are missed."""
+    return found.predicted < PREDICTED and found.best.evidence > found.unknown.evidence
+
+
+def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
+    """Value and unit for a tile: the clearest knot of an embedded law, or the share of the depth."""
+    if is_embedded(found):
+        law = _rank(found)[0]
+        value, sigma = clearest(law)[1:]
+        if law.law.over == "filling factor":
+            size = show_number(100 * value, "{:+.0f}")
+            return f"{size} ± {100 * sigma:.0f} %", f"of the strength {_say_place(law)}"
+        return f"{show_number(value, '{:+.0f}')} ± {sigma:.0f} Pa", f"on the tip {_say_place(law)}"
+    if "depth" in MISSING[found.unknown.block]:
+        return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"
+    return None
+
+
+def say_law(law: RecoveredLaw) -> str:
+    """Its clearest knot: a strength 12 ± 3 % higher than p_m gives at a filling factor of 0.18."""
+    _, value, sigma = clearest(law)
+    if law.law.over == "filling factor":
+        word = "more" if value > 0 else "less"
+        return f"{100 * abs(value):.0f} ± {100 * sigma:.0f} % {word} compressive strength {_say_place(law)}"
+    towards = {"depth": ("upwards", "downwards"), "speed": ("against the motion", "along the motion")}
+    word = towards[law.law.over][value < 0]
+    return f"a force on the tip of {abs(value):.0f} ± {sigma:.0f} Pa of its cross-section {word} {_say_place(law)}"
+
+
+def _say_place(law: RecoveredLaw) -> str:
+    knot = clearest(law)[0]
+    if law.law.over == "filling factor":
+        return f"at a filling factor of {knot:g}"
+    if law.law.over == "depth":
+        return f"at a depth of {knot:g} tip {'radius' if knot == 1 else 'radii'}"
+    return f"at {knot:g} m/s"
+
+
+def clearest(law: RecoveredLaw) -> tuple[float, float, float]:
+    """Knot, value and standard deviation where the law is largest, of knots that the data reach and that exceed their error."""
+    low, high = law.law.reach
+    reached = np.array([low <= knot <= high for knot in law.law.knots])
+    size = np.abs(law.mean)
+    for chosen in (reached & (size > law.sigma), reached, np.ones_like(reached)):
+        if chosen.any():
+            k = int(np.argmax(np.where(chosen, size, -1.0)))
+            break
+    return law.law.knots[k], float(law.mean[k]), float(law.sigma[k])
+
+
+def _rank(found: Diagnosis) -> list[RecoveredLaw]:
+    """The laws of the best freedom, first the one that explains most by itself."""
+    alone = found.unknown.evidences
+    return sorted(found.unknown.laws, key=lambda law: -alone.get(law.law.name, -math.inf))
+
+
+def _clearness(law: RecoveredLaw) -> float:
+    return float(np.max(np.abs(law.mean) / law.sigma))
+
+
+def describe_unknown(found: Diagnosis) -> dict[str, Any]:
+    """For diagnosis.json: every freedom's ln evidence over the nominal model's, and the laws at their knots."""
+    unknown = found.unknown
+    return {
+        "best": unknown.block,
+        "log_bayes": {name: value - found.nominal.evidence for name, value in unknown.evidences.items()},
+        "embedded": unknown.embedded,
+        "laws": [
+            {
+                "name": each.law.name,
+                "over": each.law.over,
+                "unit": each.law.unit,
+                "knots": list(each.law.knots),
+                "mean": each.mean.tolist(),
+                "sd": each.sigma.tolist(),
+                "value_unit": each.law.value_unit,
+            }
+            for each in unknown.laws
+        ],
+    }
+
+
+def say_formula(formula: Formula) -> str:
+    """What is added to the equations, with coefficients ± standard deviations."""
+    said = []
+    for term, c, sigma in zip(formula.terms, formula.coefficients, formula.sigma, strict=True):
+        digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
+        unit = "" if term.unit == "1" else f" {term.unit}"
+        times = "" if term.formula == "1" else f" × {term.formula}"
+        said.append(f"{PLACE_WORDS[term.place]} ({c:.{digits}f} ± {sigma:.{digits}f}){unit}{times}")
+    return " and ".join(said)
+
+
+def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
+    """For diagnosis.json: the formula with its coefficients, rivals and held-out drops; None where none was learned."""
+    learned = found.learned
+    if learned is None:
+        return None
+    best = learned.best
+    log_p_m, sigma = best.fit.log_p_m, math.sqrt(best.fit.covariance[0, 0])
+    return {
+        "terms": [
+            {"term": term.name, "coefficient": float(c), "sd": float(sd), "unit": term.unit}
+            for term, c, sd in zip(best.terms, best.coefficients, best.sigma, strict=True)
+        ],
+        "formula": say_formula(best),
+        "place": " and ".join(dict.fromkeys(term.place for term in best.terms)),
+        "log_bayes": best.fit.evidence - found.nominal.evidence,
+        "p_m_Pa": {"mean": math.exp(log_p_m), "sd": math.exp(log_p_m) * sigma},
+        "rivals": [
+            {
+                "terms": [term.name for term in each.terms],
+                "formula": say_formula(each),
+                "log_evidence_behind": best.fit.evidence - each.fit.evidence,
+            }
+            for each in learned.formulas[1:]
+        ],
+        "held_out": {
+            "rms_before_m": best.gain.rms_nominal,
+            "rms_after_m": best.gain.rms_extended,
+            "rms_noise_m": best.gain.rms_noise,
+        },
+    }
+
+
+def say_learned(found: Diagnosis) -> list[str]:
+    """What was learned, in lines; none where nothing was."""
+    if found.learned is None:
+        return []
+    best, alike = found.learned.best, found.learned.alike
+    before, after, noise = (
+        show_number(1e6 * rms, "{:.1f}")
+        for rms in (best.gain.rms_nominal, best.gain.rms_extended, best.gain.rms_noise)
+    )
+    p_m, sigma = math.exp(best.fit.log_p_m) / 1e3, math.sqrt(best.fit.covariance[0, 0])
+    said = [
+        f"a formula for what is missing: {say_formula(best)}",
+        f"with it held-out drops are missed by {after} µm rms, by {before} µm without, by {noise} µm were it the truth; "
+        f"p_m is {p_m:.3g} ± {p_m * sigma:.2g} kPa",
+    ]
+    if alike:
+        said.append(f"hardly told from it here: {'; '.join(map(say_formula, alike))}")
+    return said
+
+
+def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
+    """Words and captions of the page's section on the free law; None where there is nothing to draw."""
+    unknown = found.unknown
+    if found.verdict.word != "unknown" or not unknown.laws:
+        return None
+    ahead = unknown.evidences[unknown.block] - unknown.evidences[unknown.embedded]
+    words = (
+        "A law that is left free where the equations have a place for it: a factor on the compressive strength at some filling "
+        "factors, a force on the tip, per its cross-section, at some depths or speeds, linear between. "
+        f"Of these the data prefer {unknown.embedded}."
+    )
+    if not is_embedded(found) and ahead > 0:
+        words += (
+            f" A free law without a place in the equations ({unknown.block}) says more of these data, by {ahead:.0f} in ln "
+            "evidence: read the curves as the nearest that such a law comes to what is missing."
+        )
+    drawn = {term.place for term in found.learned.best.terms} if found.learned else set()
+    rows = []
+    for k, law in enumerate(unknown.laws):
+        points = ", ".join(
+            f"{_show(law, value)} ± {_show(law, sigma)} at {knot:g}"
+            for knot, value, sigma in zip(law.law.knots, law.mean, law.sigma, strict=True)
+        )
+        rows.append(
+            {
+                "figure": f"law{k}",
+                "title": _begin(law.law.name),
+                "text": f"{_begin(value_label(law))} against {place_label(law)}: {points}. The band holds 68 %."
+                + (" Dashed: the formula." if law.law.name in drawn else ""),
+            }
+        )
+    learned = [*say_learned(found), "labsim simulate --model model.toml simulates a drop with it"]
+    return {
+        "words": words,
+        "rows": rows,
+        "learned": " ".join(f"{_begin(text)}." for text in learned) if found.learned else "",
+    }
+
+
+def _begin(words: str) -> str:
+    return words[0].upper() + words[1:]
+
+
+def _show(law: RecoveredLaw, value: float) -> str:
+    return f"{100 * value:.1f}" if law.law.over == "filling factor" else f"{value:.1f}"
+
+
+def value_label(law: RecoveredLaw) -> str:
+    if law.law.over == "filling factor":
+        return "more strength (%)"
+    return {"depth": "force upwards (Pa)", "speed": "force against the motion (Pa)"}[law.law.over]
+
+
+def place_label(law: RecoveredLaw) -> str:
+    unit = "" if law.law.unit == "1" else f" ({law.law.unit})"
+    return {"filling factor": "filling factor", "depth": "depth", "speed": "speed"}[law.law.over] + unit

@@ -1,0 +1,1 @@
+"""From rows to a motion: its segments, what they leave open, frames that do not fit."""

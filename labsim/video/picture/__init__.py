@@ -1,0 +1,1 @@
+"""What a video shows besides the projectile: background, noise, surface, scale."""
