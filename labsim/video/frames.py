@@ -127,7 +127,7 @@ class Frames:
 def list_formats() -> dict[str, ModuleType]:
     """Modules of ``labsim/video/formats`` and of other packages by name; each has NAME, ``recognises(path)`` and
     ``open_file(path)``."""
-    return list_modules(f"{__package__}.formats", "labsim.video_formats")
+    return list_modules("labsim.video.formats", "labsim.video_formats")
 
 
 def open_frames(path: Path | str) -> Frames:

@@ -83,7 +83,7 @@ class SliceStack:
 
 def list_formats() -> dict[str, ModuleType]:
     """Modules of ``labsim/ct/formats`` and of other packages by name, each one format."""
-    return list_modules(f"{__package__}.formats", "labsim.ct_formats")
+    return list_modules("labsim.ct.formats", "labsim.ct_formats")
 
 
 def open_stack(path: Path | str) -> SliceStack:
