@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # pragma: no cover
     from .inference.fits.posterior import Posterior
     from .inference.published.calibrate import SummaryCalibration
     from .report.outputs import Axes, Figure
+    from .runs.store import Progress as StudyProgress
     from .runs.store import RunStore
     from .sph import DropRun, DropSetting
     from .video.projectile.following import Progress
@@ -222,22 +223,65 @@ def calibrate(
 
 
 def diagnose(
-    campaign: Campaign | Path | str, *, store: Path | str | None = None, **settings: Any
+    campaign: Campaign | Path | str,
+    *,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 1,
+    progress: StudyProgress | None = None,
+    use_scans: bool = True,
+    cells: int | None = None,
 ) -> Diagnosis | SummaryDiagnosis:
     """What the calibrated simulation gets wrong about a campaign, why, and what an extended model gains.
 
-    settings : workers, scheduler, progress, and for tracks what ``labsim.diagnosis.campaign.diagnose_campaign`` takes
-    (seed, cells). Raises LabsimError.
+    Parameters
+    ----------
+    campaign : Campaign or path
+        Read, or its folder.
+    store : path, optional
+        Folder of the stored runs (default: LABSIM_STORE or the user's cache).
+    workers : int, optional
+        Processes; one a core where it is not given.
+    scheduler : str, optional
+        Address of a Dask scheduler.
+    seed : int
+        Of everything that is drawn.
+    progress : callable, optional
+        Takes work done, all work and what is done, now and then.
+    use_scans, cells : bool, int
+        Whether CT maps are compared, and spacings in a tip radius; published figures have no use for them.
+
+    Returns
+    -------
+    Diagnosis or SummaryDiagnosis
+        The latter of a campaign with published figures only.
+
+    Raises
+    ------
+    LabsimError
     """
     read, opened = _read(campaign), _open(store)
     if read.has_records:
         from .diagnosis.campaign import diagnose_campaign
 
-        return diagnose_campaign(read, opened, **settings)
+        return diagnose_campaign(
+            read,
+            opened,
+            workers=workers,
+            scheduler=scheduler,
+            seed=seed,
+            progress=progress,
+            use_scans=use_scans,
+            cells=cells,
+        )
     from .diagnosis.published.campaign import diagnose_summary
     from .inference.published.calibrate import calibrate_summary
 
-    return diagnose_summary(calibrate_summary(read, opened, **settings), opened, **settings)
+    calibration = calibrate_summary(
+        read, opened, workers=workers, scheduler=scheduler, seed=seed, progress=progress
+    )
+    return diagnose_summary(calibration, opened, workers=workers, scheduler=scheduler, progress=progress)
 
 
 def write_report(

@@ -135,6 +135,21 @@ def test_the_example_of_the_package_runs_on_the_campaign_that_ships(
     assert 500.0 < float(p_m) < 4000.0 and word == "unknown"
 
 
+def test_a_diagnosis_of_published_figures_takes_a_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It went to the predictions too, which draw nothing, and ended in a TypeError."""
+    said = {}
+    monkeypatch.setattr(
+        "labsim.inference.published.calibrate.calibrate_summary",
+        lambda *_, **how: said.setdefault("p_m", how),
+    )
+    monkeypatch.setattr(
+        "labsim.diagnosis.published.campaign.diagnose_summary",
+        lambda *_, workers, scheduler, progress: said.setdefault("verdict", workers),
+    )
+    assert labsim.diagnose(labsim.example("guettler2009"), seed=3, workers=1) == 1
+    assert said["p_m"] == {"workers": 1, "scheduler": None, "seed": 3, "progress": None}
+
+
 def test_tabulate_says_what_it_takes() -> None:
     with pytest.raises(TypeError, match="int is no table"):
         labsim.tabulate(3)
