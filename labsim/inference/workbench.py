@@ -189,11 +189,7 @@ class Workbench:
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
         cells = COARSE_CELLS if coarse and self.grid.cells > COARSE_CELLS else None
-        if cells is not None:
-            if self.felt:  # what numerics do at a coarser spacing is more than they do at that of fits
-                fine = [each for each in wanted if self.effects[each[0]].kind == "numerics"]
-                self.require_changes(fine, text)
-            # no fingerprint is looked at where there are changes
+        if cells is not None:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
         plain = [Request("", None, index, cells) for index in sorted({index for _, _, index in wanted})]

@@ -37,9 +37,9 @@ COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than wha
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
-# of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration_error.py); with 6 spacings
-# fingerprints have the length that they have with 8, with 5 those of tension and friction are half as long again
-FELT_CELLS, FELT_COARSE_CELLS = 8, 6
+# of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration_error.py). Of fingerprints
+# too: with 6 spacings those of weak causes point elsewhere (benchmarks/fingerprint_spacing.py)
+FELT_CELLS = 8
 # a run's force is rough where its particles happen to lie: the mean over these factors on the spacing is compared
 FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
@@ -238,10 +238,7 @@ class RunGrid:
 
     def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
         """The nominal model of the campaign for one node."""
-        if family.felt:
-            usual = max(self.cells, FELT_CELLS) if cells is None else FELT_COARSE_CELLS
-        else:
-            usual = cells or self.cells
+        usual = max(self.cells, FELT_CELLS) if family.felt else cells or self.cells
         own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else usual
         setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
         if family.pushed:
