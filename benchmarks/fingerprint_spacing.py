@@ -1,11 +1,11 @@
 """How alike fingerprints of causes are that come from coarser runs, for drops with an accelerometer.
 
-    python benchmarks/fingerprint_spacing.py [CAMPAIGN] [--workers 2]
+    python benchmarks/fingerprint_spacing.py [CAMPAIGN]
 
 A fingerprint is what a cause changes in the data, over their errors, after p_m and all nuisances are taken out. The campaign is
 data/campaigns/f161 where none is named. Of every cause with runs: the cosine between its fingerprint from coarser runs and that
 from runs as fits have them (8 spacings in a tip radius, the mean of two), and how long it is over that. Last: CPU seconds of the
-screening, all of it simulated anew.
+screening, all of it simulated anew in this one process.
 """
 
 from __future__ import annotations
@@ -26,17 +26,11 @@ from labsim.records import Campaign
 from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[1] / "data" / "campaigns" / "f161"
-RUNS = (
-    (8, 2),
-    (8, 1),
-    (6, 2),
-    (6, 1),
-)  # spacings in a tip radius, runs of which the mean is taken; the first is that of fits
+# spacings in a tip radius, and of how many runs the mean is taken; the first is that of fits
+RUNS = ((8, 2), (8, 1), (6, 2), (6, 1))
 
 
-def find_fingerprints(
-    campaign: Campaign, spacings: int, count: int, workers: int
-) -> tuple[dict[str, np.ndarray], float]:
+def find_fingerprints(campaign: Campaign, spacings: int, count: int) -> tuple[dict[str, np.ndarray], float]:
     """Name of a cause -> its fingerprint per step; and CPU seconds. count : runs of which the mean is taken."""
     # of fingerprints a run of ``spacings``, or two: their spacing is that of fits times a factor
     factors = tuple(
@@ -44,7 +38,7 @@ def find_fingerprints(
     )
     grid.Family.spacings = lambda family, cells: grid.FELT_SPACINGS if cells is None else factors  # type: ignore[method-assign]
     with tempfile.TemporaryDirectory() as folder:
-        bench, nominal = prepare(campaign, RunStore(), workers=workers, terms=set_terms(campaign))
+        bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
         bench.grid.store = RunStore(Path(folder))
         began = time.process_time()
         found = screen(bench, nominal, np.random.default_rng(1))
@@ -61,10 +55,8 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("campaign", type=Path, nargs="?", default=CAMPAIGN)
-    parser.add_argument("--workers", type=int, default=1)
-    given = parser.parse_args()
-    campaign = read_campaign(given.campaign)
-    found = {runs: find_fingerprints(campaign, *runs, given.workers) for runs in RUNS}
+    campaign = read_campaign(parser.parse_args().campaign)
+    found = {runs: find_fingerprints(campaign, *runs) for runs in RUNS}
     finest, *coarser = RUNS
     lengths = {name: float(np.linalg.norm(each)) for name, each in found[finest][0].items()}
     words = [f"{count} × {spacings}" for spacings, count in coarser]

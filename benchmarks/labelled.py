@@ -139,8 +139,8 @@ def make_campaigns(
     planned = tomllib.loads(arguments.plan.read_text())["campaign"]
     for k, hidden in enumerate(planned):
         hidden.setdefault("name", f"{letter}{k + 1:02d}")
-    asked = [name for name in arguments.only.split(",") if name]
-    unplanned = set(asked) - {h["name"] for h in planned}
+    asked = {name for name in arguments.only.split(",") if name}
+    unplanned = asked - {h["name"] for h in planned}
     if unplanned:
         parser.error(f"{arguments.plan} plans no {', '.join(sorted(unplanned))}")
     chosen = [h for h in planned if not asked or h["name"] in asked]

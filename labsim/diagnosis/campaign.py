@@ -44,7 +44,7 @@ from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_ou
 from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, return_to_singles, settle_leading
-from .screen import CLOSE, Score, Screening, list_confusable, screen
+from .screen import CLOSE, Score, Screening, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unlisted.free_law import fit_hats, is_wanted
 from .unlisted.learned_law import LearnedLaw, learn_law
@@ -264,6 +264,7 @@ def diagnose_campaign(
         (held_nominal, posterior) if found.best is nominal else _predict(bench, best, seed, progress)
     )
     warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
+    warnings += warn_failed(bench)
     warnings += warn_unused_scans(bench)
     if found.p_value < REJECTED:
         warnings += doubt_surface_rows(seen.drops)
@@ -344,6 +345,15 @@ def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:
 def _predict(bench: Workbench, fit: Fit, seed: int, progress: Progress | None) -> tuple[HeldOut, Posterior]:
     """What follows from a fit: of held-out drops, of its parameters."""
     return predict_held_out(bench, fit), sample_fit(bench, fit, seed=seed, progress=progress)
+
+
+def warn_failed(bench: Workbench) -> list[str]:
+    """Of every cause that no verdict knows of: of one projectile at least, no run with it stopped, on either side of its null."""
+    return [
+        f"{name}: is not judged, since its runs fail; see labsim runs"
+        for name, effect in bench.effects.items()
+        if effect.amplitudes and bench.costs_runs(name) and cause(name) == name and not has_runs(bench, name)
+    ]
 
 
 def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> list[Fit]:

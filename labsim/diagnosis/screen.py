@@ -63,10 +63,7 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     names = [name for name in (names or bench.effects) if bench.effects[name].amplitudes]
     simulated = [name for name in names if bench.costs_runs(name)]
     bench.require_fingerprints(simulated, fit.log_p_m, "what each cause changes")
-    failed = [name for name in simulated if not has_runs(bench, name)]
-    for name in failed:
-        bench.reasons[name] = f"is not judged: its runs fail at a p_m near {math.exp(fit.log_p_m):.3g} Pa"
-    names = [name for name in names if name not in failed]
+    names = [name for name in names if name not in simulated or has_runs(bench, name)]
     whitened = whiten_all(with_probes(bench, fit, names), ["ln_p_m", *names])
     sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))
     direction = whitened[:, 1] * sigma

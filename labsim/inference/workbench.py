@@ -188,7 +188,7 @@ class Workbench:
         self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, coarse: bool = False
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
-        cells = COARSE_CELLS if coarse and self.grid.cells > COARSE_CELLS else None
+        cells = self._coarse_cells if coarse else None
         if cells is not None:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
@@ -207,21 +207,24 @@ class Workbench:
         self.require_base_about(log_p_m)
         index = screening_node(log_p_m)
         for side in (1.0, -1.0):
-            lacking = [name for name in names if not self._has_change(name, index)]
             wanted = [
                 (name, amplitude, index)
-                for name in lacking
+                for name in names
+                if not self._has_fingerprint(name, index)
                 for amplitude in amplitude_nodes(self.effects[name], 0.0, side=side)
             ]
-            if wanted:
-                self.require_changes(wanted, text, coarse=True)
+            self.require_changes(wanted, text, coarse=True)
 
-    def _has_change(self, name: str, index: float) -> bool:
-        """Whether an effect has runs of its own, or every projectile a fingerprint of it at a strength node."""
-        return all(
-            name in each.table.changes or each.table.fingerprints.get(name, {}).get(index)
-            for each in self.features
-        )
+    @property
+    def _coarse_cells(self) -> int | None:
+        """Spacings in a tip radius of fingerprints; None where fits themselves are as coarse, and fingerprints are changes."""
+        return COARSE_CELLS if self.grid.cells > COARSE_CELLS else None
+
+    def _has_fingerprint(self, name: str, index: float) -> bool:
+        """Whether every projectile has a run at a strength node by which an effect is known there."""
+        tables = [each.table for each in self.features]
+        kept = [table.changes if self._coarse_cells is None else table.fingerprints for table in tables]
+        return all(each.get(name, {}).get(index) for each in kept)
 
     def initial_setting(self, amplitudes: Mapping[str, float], name: str) -> DropSetting:
         """What would be simulated at the place of a drop or scan, for data that need no run: its initial state counts.

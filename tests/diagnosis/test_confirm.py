@@ -61,3 +61,22 @@ def test_a_fit_less_likely_than_its_null_is_made_again_from_there(monkeypatch, f
     nominal.log_likelihood = -85.0
     assert campaign._fit_from_score(bench, nominal, score).where == "far"
     assert starts == [20.0]
+
+
+def test_a_cause_whose_runs_fail_is_said_not_to_be_judged():
+    """Half the shear strength under a heavy projectile left a true cause without probability, and nobody was told."""
+    tables = [SimpleNamespace(changes={}, fingerprints={"pore_gas": {-2: {8000.0: 0.0}}}) for _ in range(2)]
+    for table, runs in zip(tables, ({-0.7: 0.0}, {}), strict=True):
+        table.fingerprints["shear_strength"] = {-2: runs}
+    bench = SimpleNamespace(
+        effects={
+            name: SimpleNamespace(amplitudes=[None])
+            for name in ("pore_gas", "shear_strength", "shear_strength@0.5", "pixel_scale")
+        },
+        costs_runs=lambda name: name != "pixel_scale",
+        features=[SimpleNamespace(table=table) for table in tables],
+    )
+    (said,) = campaign.warn_failed(bench)
+    assert said.startswith("shear_strength: is not judged")
+    tables[1].fingerprints["shear_strength"][-2] = {0.7: 0.0}
+    assert campaign.warn_failed(bench) == []

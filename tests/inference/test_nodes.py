@@ -131,6 +131,7 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
     asked = []
 
     def require_changes(wanted, text, *, coarse):
+        assert coarse
         for name, amplitude, index in wanted:
             asked.append((name, np.sign(amplitude)))
             for k, table in enumerate(tables):
@@ -140,11 +141,12 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
 
     bench = SimpleNamespace(
         effects=list_effects(None),
+        _coarse_cells=4,
         features=[SimpleNamespace(table=table) for table in tables],
         require_base_about=lambda log_p_m: None,
         require_changes=require_changes,
     )
-    bench._has_change = MethodType(Workbench._has_change, bench)
+    bench._has_fingerprint = MethodType(Workbench._has_fingerprint, bench)
     Workbench.require_fingerprints(bench, ["shear_strength", "tensile_strength"], math.log(340.0), "causes")
     steps = {n: np.sign(bench.effects[n].amplitudes[0].step) for n in ("shear_strength", "tensile_strength")}
     assert steps["shear_strength"] < 0.0

@@ -95,7 +95,7 @@ class Response:
             runs, across = self.table.fingerprints[name], interpolation_weights(few, self.log_speed)
         indices = [index for index in runs if runs[index]]
         if not indices:
-            raise ExtrapolationError("simulation", name, "every run with it failed; see labsim runs --failed")
+            raise ExtrapolationError("simulation", name, "every run with it failed; see labsim runs")
         nodes = _log_strengths(indices)
         margin = 0.5 * math.log(STRENGTH_RATIO)
         inside = min(max(self.log_p_m, min(nodes) - margin), max(nodes) + margin)
