@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from feel import GRAVITY, SCALE_SIGMA, Sensing, write_felt
-from mesh import BEAD_DENSITY, Dust, Numerics, run_drop
+from mesh import BEAD_DENSITY, Dust, Forces, Numerics, run_drop
 from quadrilateral import find_strengths
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -64,7 +64,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 speed,
                 Numerics(cells=CELLS),
                 mass=mass * heavier_than_stated,
-                side=hidden.get("body", {}).get("side", 0.0) * radius / labelled.SMALL,
+                forces=Forces(side=hidden.get("body", {}).get("side", 0.0) * radius / labelled.SMALL),
             )
             label = f"D{k + 1:02d}"
             write_felt(

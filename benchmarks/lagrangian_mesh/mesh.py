@@ -27,6 +27,11 @@ class Dust:
     rate_n: float = 1.0
     crust: tuple[float, float] = (0.0, 1.0)  # Δφ, ℓ (m): φ + Δφ exp(-depth/ℓ)
     gradient: float = 0.0  # dφ/dz downwards, 1/m
+    layers: tuple[float, float] = (0.0, 1.0)  # amplitude of φ, period (m)
+    interface: tuple[float, float, float] = (0.0, 0.0, 1.0)  # depth, thickness (m), factor on Σ in it
+    weakening: float = 0.0  # share of Σ that shear can take, and Y with it
+    weakening_shear: float = 0.3  # plastic strain that takes half of that
+    hardening: float = 0.0  # growth of Y per plastic strain
 
     @property
     def law(self) -> np.ndarray:
@@ -36,12 +41,33 @@ class Dust:
                 self.p_m, self.phi_1, self.phi_2, self.delta * np.log(10.0), self.bulk_modulus,
                 self.shear_to_bulk, self.shear_factor, self.tensile_factor, self.solid,
                 self.gas_pressure, self.filling_factor, self.eta, self.rate_n,
+                self.weakening, self.weakening_shear, self.hardening,
             ]
         )  # fmt: skip
 
     def fill(self, depth: np.ndarray) -> np.ndarray:
         """φ before the drop at a depth, m."""
-        return self.filling_factor + self.crust[0] * np.exp(-depth / self.crust[1]) + self.gradient * depth
+        phi = self.filling_factor + self.crust[0] * np.exp(-depth / self.crust[1]) + self.gradient * depth
+        return phi + self.layers[0] * np.sin(2.0 * np.pi * depth / self.layers[1])
+
+
+@dataclass(frozen=True)
+class Forces:
+    """On the projectile while it is in the dust, upwards, beside the dust's stress."""
+
+    side: float = 0.0  # N per metre of immersed length
+    shaft_drag: float = 0.0  # N s^2/m^2 per metre of immersed length
+    pull: float = 0.0  # N
+    viscous: float = 0.0  # N s/m
+    inertial: float = 0.0  # N s^2/m^2
+    film: tuple[float, float] = (0.0, 0.0)  # N, and the depth (m) that it reaches to
+    gathered: float = 0.0  # not a force: share of the mass that is gathered per radius of depth
+
+    @property
+    def law(self) -> np.ndarray:
+        """The numbers that the mesh takes, in its order, per radian."""
+        held = [self.side, self.shaft_drag, self.pull, self.viscous, self.inertial, self.film[0]]
+        return np.array([*(each / (2 * np.pi) for each in held), self.film[1]])
 
 
 @dataclass(frozen=True)
@@ -59,7 +85,7 @@ class Numerics:
 
 @dataclass(frozen=True)
 class Result:
-    """time, depth, speed, force on the projectile: (k,), SI. r, z, volume, phi of the cells at the stop: (n, m); nodes_r, nodes_z
+    """time, depth, speed, force on the projectile: (k,), SI. r, z, volume, phi of the cells at the end: (n, m); nodes_r, nodes_z
     (n+1, m+1). energies in J, and energy_error in kinetic energies at contact."""
 
     time: np.ndarray = field(repr=False)
@@ -103,7 +129,11 @@ def lay_mesh(r: np.ndarray, z: np.ndarray, dust: Dust, gravity: float) -> np.nda
     cells[..., quadrilateral.PHI] = phi
     cells[..., quadrilateral.MASS] = phi * dust.solid * cells[..., quadrilateral.VOLUME]
     crush = np.vectorize(lambda each: quadrilateral.find_strengths(each, dust.law)[0])(phi)
-    pressure = np.minimum(-phi * dust.solid * gravity * mean(z), 0.999 * crush)
+    strength = np.where(
+        np.abs(-mean(z) - dust.interface[0]) < 0.5 * dust.interface[1], dust.interface[2], 1.0
+    )
+    cells[..., quadrilateral.STRENGTH] = strength
+    pressure = np.minimum(-phi * dust.solid * gravity * mean(z), 0.999 * crush * strength)
     cells[..., quadrilateral.PRESSURE] = pressure
     cells[..., quadrilateral.PHI0] = [
         [quadrilateral.find_unstressed(f, p, dust.bulk_modulus) for f, p in zip(*rows, strict=True)]
@@ -138,10 +168,13 @@ def run_drop(
     mass: float | None = None,
     sphere: bool = False,
     gravity: float = 9.81,
-    side: float = 0.0,
+    forces: Forces = Forces(),
+    after: float = 1.0,
 ) -> Result:
-    """Run one drop to its stop; mass (kg) is that of a glass bead by default, side (N/m) a force per immersed length that holds
-    the rod back. RuntimeError where the mesh tangles."""
+    """Run one drop to its stop, or ``after`` times as long; mass (kg) is that of a glass bead by default.
+
+    Raises RuntimeError where the mesh tangles.
+    """
     mass = BEAD_DENSITY * 4 / 3 * np.pi * radius**3 if mass is None else mass
     h = radius / numerics.cells
     edges_r = grade(numerics.even * radius, numerics.width * radius, h, numerics.growth)
@@ -150,10 +183,11 @@ def run_drop(
     cells = lay_mesh(r, z, dust, gravity)
     elastic = find_elastic_energy(cells, dust)
     curve = np.zeros((400_000, 4))
-    body = np.array([radius, mass / (2 * np.pi), speed, float(sphere), side / (2 * np.pi)])
+    body = np.array([radius, mass / (2 * np.pi), speed, float(sphere), forces.gathered])
     damping = np.array([numerics.linear, numerics.quadratic, numerics.hourglass])
-    steps, spent = quadrilateral.advance(
-        r, z, cells, dust.law, damping, body, gravity, numerics.courant, 60.0 * radius, curve
+    law, end = dust.law, 60.0 * radius
+    steps, stopped, spent = quadrilateral.advance(
+        r, z, cells, law, damping, body, forces.law, gravity, numerics.courant, end, after, curve
     )
     if steps < 0:
         raise RuntimeError(
@@ -161,9 +195,13 @@ def run_drop(
         )
     curve = curve[: steps + 1].copy()
     clock, height, velocity, force = curve.T
-    if velocity[-1] < 0.0:
+    if stopped == 0:
         raise RuntimeError(f"no stop within {clock[-1] * 1e3:.3g} ms")
-    back = velocity[-1] / (velocity[-1] - velocity[-2]) * (clock[-1] - clock[-2])
+    back = (
+        velocity[stopped]
+        / (velocity[stopped] - velocity[stopped - 1])
+        * (clock[stopped] - clock[stopped - 1])
+    )
     elastic = find_elastic_energy(cells, dust) - elastic
     gas = find_gas_energy(cells, dust)
     energies = {
@@ -176,7 +214,8 @@ def run_drop(
         "viscous": 2 * np.pi * spent[1],
         "hourglass": 2 * np.pi * spent[2],
         "contact": 2 * np.pi * spent[3],
-        "side": 2 * np.pi * spent[6],
+        "forces": 2 * np.pi * spent[6],
+        "gathered mass": 2 * np.pi * spent[7],
     }
     brought, gained, *left = energies.values()
     return Result(
@@ -184,8 +223,8 @@ def run_drop(
         depth=-height,
         speed=-velocity,
         force=2 * np.pi * force,
-        stopping_time=clock[-1] - back,
-        stopping_depth=-(height[-1] - 0.5 * back * velocity[-1]),
+        stopping_time=clock[stopped] - back,
+        stopping_depth=-(height[stopped] - 0.5 * back * velocity[stopped]),
         r=0.25 * (r[:-1, :-1] + r[1:, :-1] + r[:-1, 1:] + r[1:, 1:]),
         z=0.25 * (z[:-1, :-1] + z[1:, :-1] + z[:-1, 1:] + z[1:, 1:]),
         volume=2 * np.pi * cells[..., quadrilateral.VOLUME],

@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 
 # columns of a cell
-MASS, VOLUME, PHI, PHI0, PRESSURE, SRR, SZZ, SRZ = range(8)
-COLUMNS = 8
+MASS, VOLUME, PHI, PHI0, PRESSURE, SRR, SZZ, SRZ, PLASTIC, STRENGTH = range(10)
+COLUMNS = 10  # PLASTIC: equivalent plastic strain of shear; STRENGTH: factor on Σ here
 # entries of what has been spent, J per radian
 STRESS_WORK, VISCOUS, HOURGLASS = range(3)
 EDGE = 0.002  # of φ to the poles of Σ: below it Σ stays as it is there, above it follows its tangent
@@ -25,7 +25,7 @@ REFERENCE = 0.15  # φ at which the bulk modulus is stated
 @njit(inline="always")
 def find_strengths(phi, law):
     """Σ and |T| in Pa at φ. law: p_m, φ1, φ2, Δ ln 10, K0, μ/K, shear factor, tensile factor, solid density, gas pressure, φ at
-    the start."""
+    the start, rate factor and exponent, share of Σ that shear takes, plastic strain for half of it, growth of Y with it."""
     p_m, phi_1, phi_2, exponent = law[:4]
     inside = min(max(phi, phi_1 + EDGE), phi_2 - EDGE)
     compressive = p_m * ((inside - phi_1) / (phi_2 - inside)) ** exponent
@@ -52,11 +52,11 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
     """Strain every cell by the velocities that brought its corners here within dt; set the forces on the nodes.
 
     r, z, u, v, force_r, force_z : (n+1, m+1), nodes; the first index grows with r, the second downwards
-    cells : (n, m, 8); damping : linear and quadratic bulk viscosity, hourglass
+    cells : (n, m, COLUMNS); damping : linear and quadratic bulk viscosity, hourglass
     spent : (3,), added to. Returns the shortest time (s) in which sound crosses a cell, or -1 where a cell has turned over.
     """
     k0, shear_to_bulk, shear_factor, solid, gas, phi_start = law[4], law[5], law[6], law[8], law[9], law[10]
-    eta, rate_n = law[11], law[12]
+    eta, rate_n, weakening, halving, hardening = law[11], law[12], law[13], law[14], law[15]
     linear, quadratic, hourglass = damping
     force_r[:] = 0.0
     force_z[:] = 0.0
@@ -91,6 +91,9 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
             div = lrr + lzz + hoop
             # pressure
             compressive, tensile = find_strengths(phi, law)
+            compressive *= cell[STRENGTH]
+            if weakening > 0.0:
+                compressive *= 1.0 - weakening * (1.0 - 2.0 ** (-cell[PLASTIC] / halving))
             if eta > 0.0 and div < 0.0:
                 compressive *= 1.0 + eta * (-div) ** rate_n
             phi0 = cell[PHI0]
@@ -110,7 +113,10 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
             srz = cell[SRZ] + dt * (2.0 * mu * shear + spin * (cell[SZZ] - cell[SRR]))
             mises = math.sqrt(1.5 * (srr * srr + szz * szz + (srr + szz) ** 2) + 3.0 * srz * srz)
             strength = shear_factor * math.sqrt(compressive * tensile)
+            if hardening != 0.0:
+                strength *= 1.0 + hardening * cell[PLASTIC]
             if mises > strength:
+                cell[PLASTIC] += (mises - strength) / (3.0 * mu)
                 back = strength / mises
                 srr, szz, srz = back * srr, back * szz, back * srz
             stt = -srr - szz
@@ -165,17 +171,33 @@ def find_surface(r, z, tip, radius, sphere):
     return d - radius, r / d, up / d
 
 
-@njit(cache=True)
-def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
-    """Run from contact to the first v = 0 (or ``end``, s). The top row of nodes may not enter the projectile.
+@njit(inline="always")
+def resist(depth, speed, forces):
+    """Upward force on the projectile, beside the dust's stress. depth, speed : downwards; forces : side and shaft's drag per
+    immersed length, pull, drag with v, with v², film, the depth that it reaches to."""
+    if depth <= 0.0:
+        return 0.0
+    if speed <= 0.0:
+        return forces[2]
+    moving = (forces[0] + forces[1] * speed * speed) * depth + (forces[3] + forces[4] * speed) * speed
+    if depth < forces[6]:
+        moving += forces[5]
+    return moving + forces[2]
 
-    body : radius, mass per radian, speed downwards, 1 for a sphere or 0 for the end of a rod, side force per immersed length
-    and radian
+
+@njit(cache=True)
+def advance(r, z, cells, law, damping, body, forces, gravity, courant, end, after, curve):
+    """Run from contact to the first v = 0, or ``after`` times as long, to ``end`` (s) at most. The top row of nodes may not enter
+    the projectile.
+
+    body : radius, mass per radian, speed downwards, 1 for a sphere or 0 for the end of a rod, share of its mass that it gathers
+    per radius of depth
+    forces : (7,) as in ``resist``, per radian
     curve : (k, 4) time, height of the tip, its velocity, force on it per radian, a row a step
-    Returns steps (negative where a cell turned over), energies (7,) per radian: stress work, viscous, hourglass, contact,
-    kinetic of the dust, potential energy it gained, work of the side force.
+    Returns steps (negative where a cell turned over), steps to the first v = 0, energies (8,) per radian: stress work, viscous,
+    hourglass, contact, kinetic of the dust, potential energy it gained, work of the forces, what gathered mass takes.
     """
-    radius, mass, speed, sphere, side = body[0], body[1], body[2], body[3] > 0.5, body[4]
+    radius, alone, speed, sphere, gathered = body[0], body[1], body[2], body[3] > 0.5, body[4]
     shape = r.shape
     u, v, force_r, force_z = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     nodes = np.zeros(shape)
@@ -187,9 +209,9 @@ def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
             nodes[i, j + 1] += quarter
             nodes[i + 1, j + 1] += quarter
     last, floor = shape[0] - 1, shape[1] - 1
-    spent, energies = np.zeros(3), np.zeros(7)
+    spent, energies = np.zeros(3), np.zeros(8)
     crossing = load_nodes(r, z, u, v, 0.0, cells, law, damping, force_r, force_z, spent)
-    tip, falling, time, steps = 0.0, -speed, 0.0, 0
+    tip, falling, time, steps, stopped, mass = 0.0, -speed, 0.0, 0, 0, alone
     curve[0] = 0.0, 0.0, -speed, 0.0
     while time < end and steps < curve.shape[0] - 1:
         dt = courant * crossing
@@ -215,8 +237,15 @@ def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
                 r[i, j] += dt * u_new
                 z[i, j] += dt * v_new
                 u[i, j], v[i, j] = u_new, v_new
-        held = side * max(-tip, 0.0) * dt
-        slowed = falling + (push + held) / mass - gravity * dt
+        held = resist(-tip, -falling, forces) * dt
+        if gathered == 0.0:
+            slowed = falling + (push + held) / mass - gravity * dt
+        else:  # momentum is kept
+            heavier = max(mass, alone * (1.0 + gathered * -tip / radius))
+            slowed = (mass * falling + push + held) / heavier - gravity * dt
+            energies[7] += 0.5 * (heavier - mass) * falling * slowed
+            energies[7] += 0.5 * (heavier - alone) * gravity * dt * (falling + slowed)
+            mass = heavier
         energies[3] -= node_work + 0.5 * push * (falling + slowed)
         energies[6] -= 0.5 * held * (falling + slowed)
         tip += dt * slowed
@@ -226,9 +255,9 @@ def advance(r, z, cells, law, damping, body, gravity, courant, end, curve):
         curve[steps] = time, tip, falling, push / dt
         crossing = load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent)
         if crossing < 0.0:
-            return -steps, energies
-        if falling >= 0.0:
-            break
+            return -steps, stopped, energies
+        if stopped == 0 and falling >= 0.0:
+            stopped, end = steps, after * time
     energies[:3] = spent
     energies[4] = 0.5 * np.sum(nodes * (u * u + v * v))
-    return steps, energies
+    return steps, stopped, energies

@@ -149,17 +149,41 @@ def test_what_tangles_says_so():
 
 
 @pytest.mark.parametrize(
-    ("dust", "side"),
+    ("dust", "forces"),
     [
-        ({}, 0.15),
-        ({"eta": 0.04, "rate_n": 0.5}, 0.0),
-        ({"gradient": 8.0}, 0.0),
-        ({"crust": (0.03, 0.5e-3)}, 0.0),
+        ({"eta": 0.04, "rate_n": 0.5}, {}),
+        ({"gradient": 8.0}, {}),
+        ({"crust": (0.03, 0.5e-3)}, {}),
+        ({"interface": (0.3e-3, 0.2e-3, 3.0)}, {}),
+        ({"hardening": 3.0}, {}),
+        ({}, {"side": 0.15}),
+        ({}, {"shaft_drag": 2.0}),
+        ({}, {"pull": 1e-5}),
+        ({}, {"viscous": 1e-4}),
+        ({}, {"inertial": 3e-4}),
+        ({}, {"film": (3e-5, 0.2e-3)}),
+        ({}, {"gathered": 0.5}),
     ],
 )
-def test_what_campaigns_hide_holds_a_drop_back_and_closes_its_book(dust, side):
+def test_what_campaigns_hide_holds_a_drop_back_and_closes_its_book(dust, forces):
     plain = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
-    held = mesh.run_drop(mesh.Dust(**dust), RADIUS, 0.30, side=side)
+    held = mesh.run_drop(mesh.Dust(**dust), RADIUS, 0.30, forces=mesh.Forces(**forces))
     assert held.stopping_depth < 0.99 * plain.stopping_depth
     assert abs(held.energy_error) < 0.005
-    assert (held.energies["side"] > 0.0) == (side > 0.0)
+    assert (held.energies["forces"] + held.energies["gathered mass"] > 0.0) == bool(forces)
+
+
+def test_dust_that_shear_weakens_lets_a_drop_go_deeper_and_closes_its_book():
+    plain = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
+    let = mesh.run_drop(mesh.Dust(weakening=0.4), RADIUS, 0.30)
+    assert let.stopping_depth > 1.01 * plain.stopping_depth
+    assert abs(let.energy_error) < 0.005
+
+
+def test_after_its_stop_a_drop_comes_up_and_closes_its_book():
+    stop = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
+    rest = mesh.run_drop(mesh.Dust(), RADIUS, 0.30, after=2.0)
+    assert rest.stopping_depth == stop.stopping_depth
+    assert rest.time[-1] == pytest.approx(2.0 * stop.stopping_time, rel=0.01)
+    assert 0.8 * stop.stopping_depth < rest.depth[-1] < stop.stopping_depth
+    assert abs(rest.energy_error) < 0.005
