@@ -102,6 +102,9 @@ def prepare(
         starts = [math.log(p) for p in OTHER_STARTS if campaign.p_m_range[0] <= p <= campaign.p_m_range[1]]
         fits = [nominal, *(fit_hypothesis(bench, (), (start, {})) for start in starts)]
         nominal = max(fits, key=lambda fit: fit.evidence)
+    if bench.numerics:
+        bench.require_fingerprints(list(bench.numerics), nominal.log_p_m, "what the solver's settings change")
+        nominal = fit_hypothesis(bench, (), (nominal.log_p_m, {}), nuisances=nominal)
     return bench, nominal
 
 

@@ -65,6 +65,10 @@ def open_workbench(
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
     refuse_others(campaign)
     drops = drops if drops is not None else observe_drops(campaign)[0]
+    resolved, numerics, reasons = resolve_effects(
+        campaign, effects, felt=any(isinstance(drop, ObservedImpact) for drop in drops)
+    )
+    errors = {name: (each.amplitudes[0].step, each.amplitudes[0].prior.sd) for name, each in numerics.items()}
     if not drops:
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
@@ -111,7 +115,7 @@ def open_workbench(
         if felt:
             of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
         models += [
-            make_acceleration_model(drop, speeds)
+            make_acceleration_model(drop, speeds, errors)
             if isinstance(drop, ObservedImpact)
             else make_drop_model(drop, table)
             for drop in group
@@ -133,15 +137,6 @@ def open_workbench(
     if undisturbed:
         observations.append(Layering(tuple(undisturbed), campaign.sample.filling_factor_sigma))
     observations += observe_further(campaign)
-    resolved, reasons = {}, {}
-    for name, effect in effects.items():
-        reason = effect.applies(campaign)
-        if reason:
-            reasons[name] = reason
-        else:
-            known = effect.for_campaign(campaign)
-            rough = known.kind != "numerics" and any(family.felt for family in families)
-            resolved[name] = known.stretch(FELT_STEPS) if rough else known
     grid = RunGrid(campaign, store, families, workers=workers, scheduler=scheduler, progress=progress)
     if cells:
         grid.cells = cells
@@ -153,6 +148,7 @@ def open_workbench(
         families,
         places,
         resolved,
+        numerics,
         terms or Terms(),
         tuple(observations),
         reasons,
@@ -160,6 +156,28 @@ def open_workbench(
     if model is not None:
         extend(bench, model)
     return bench
+
+
+def resolve_effects(
+    campaign: Campaign, effects: Mapping[str, Effect], *, felt: bool
+) -> tuple[dict[str, Effect], dict[str, Effect], dict[str, str]]:
+    """Effects that may be at work; the solver's settings that are among the errors; why others are not tried, by name.
+
+    felt : an accelerometer is on some drops.
+    """
+    causes, numerics, reasons = {}, {}, {}
+    for name, effect in effects.items():
+        reason = effect.applies(campaign)
+        if reason:
+            reasons[name] = reason
+            continue
+        known = effect.for_campaign(campaign)
+        if felt and known.kind == "numerics" and known.amplitudes:
+            numerics[name] = known
+            reasons[name] = "is among the errors of what an accelerometer feels, not among the causes"
+        else:
+            causes[name] = known.stretch(FELT_STEPS) if felt and known.kind != "numerics" else known
+    return causes, numerics, reasons
 
 
 def extend(bench: Workbench, model: Model) -> None:

@@ -40,6 +40,8 @@ class Workbench:
     families: list[Family]
     places: dict[str, Place]
     effects: dict[str, Effect]
+    # of the solver's settings: what they change is an error of drops that an accelerometer feels, and no cause
+    numerics: dict[str, Effect]
     terms: Terms
     observations: tuple[Observation, ...]  # all drops first
     reasons: dict[str, str]  # why an effect does not apply
@@ -129,7 +131,7 @@ class Workbench:
         for (table, codes), (_, plain) in zip(after, before, strict=True):
             kept = table.changes if cells is None else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
-            table.parameters[name] = self.effects[name].amplitudes[0]
+            table.parameters[name] = self._find(name).amplitudes[0]
             if codes is not None and plain is not None:
                 entry[amplitude] = codes - plain
 
@@ -155,11 +157,14 @@ class Workbench:
 
     def at(self, name: str, amplitude: float) -> dict[str, float]:
         """Values of an effect's parameters at an amplitude, kept inside the limits."""
-        parameter = self.effects[name].amplitudes[0]
+        parameter = self._find(name).amplitudes[0]
         return {parameter.name: parameter.hold(amplitude)}
 
+    def _find(self, name: str) -> Effect:
+        return self.effects[name] if name in self.effects else self.numerics[name]
+
     def change(self, name: str, amplitude: float) -> Change:
-        effect, values = self.effects[name], self.at(name, amplitude)
+        effect, values = self._find(name), self.at(name, amplitude)
 
         def apply(setting):
             return effect.apply(setting, values, self.place_of(setting.projectile.tip))
@@ -211,7 +216,7 @@ class Workbench:
                 (name, amplitude, index)
                 for name in names
                 if not self._has_fingerprint(name, index)
-                for amplitude in amplitude_nodes(self.effects[name], 0.0, side=side)
+                for amplitude in amplitude_nodes(self._find(name), 0.0, side=side)
             ]
             self.require_changes(wanted, text, coarse=True)
 

@@ -190,6 +190,30 @@ def test_errors_of_a_record_do_not_pass_for_its_scale(tmp_path: Path) -> None:
         assert scale == pytest.approx(0.01 * here, abs=1e-9)
 
 
+def test_what_a_setting_of_the_solver_changes_is_an_error_and_no_cause(tmp_path: Path) -> None:
+    """No dust has the solver's viscosity. Another code's force differed along what it changes, and it passed for a cause."""
+    folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
+    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    settings = {"artificial_viscosity", "resolution"}
+    assert set(bench.numerics) == settings <= set(bench.reasons) and not settings & set(bench.effects)
+    model = bench.tracks.models[0]
+    assert isinstance(model, AccelerationModel)
+    amplitude, sigma = model.numerics["artificial_viscosity"]
+    assert sigma == bench.numerics["artificial_viscosity"].amplitudes[0].prior.sd
+    for changes in model.table.fingerprints["artificial_viscosity"].values():  # what half of it would do
+        changes[amplitude] = np.full_like(next(iter(changes.values())), 0.01)
+    block = steps.solve_at(bench, steps.Place(fit_.log_p_m, {}, fit_.nuisances)).blocks[0]
+    code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
+    instant = model.start._replace(
+        **dict(zip(("contact_time", "log_speed"), fit_.nuisances[0][0], strict=False))
+    )
+    moved = model.predict(code + 0.01, Instrument(), instant) - model.predict(code, Instrument(), instant)
+    column = moved * sigma / amplitude
+    added = block.covariance - fit_.blocks[0].covariance
+    n = column.size
+    assert added[:n, :n] == pytest.approx(np.outer(column, column), rel=1e-3, abs=1e-3 * np.max(column**2))
+
+
 @pytest.mark.parametrize("off", [-1.2, -0.5, 0.5, 1.2])
 def test_a_contact_that_is_off_finds_back(off: float, tmp_path: Path) -> None:
     """Stretches too early or too late: the force of a round tip begins at nought, so a slope leads to the same χ² as before."""

@@ -147,6 +147,7 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
         require_changes=require_changes,
     )
     bench._has_fingerprint = MethodType(Workbench._has_fingerprint, bench)
+    bench._find = lambda name: bench.effects[name]
     Workbench.require_fingerprints(bench, ["shear_strength", "tensile_strength"], math.log(340.0), "causes")
     steps = {n: np.sign(bench.effects[n].amplitudes[0].step) for n in ("shear_strength", "tensile_strength")}
     assert steps["shear_strength"] < 0.0

@@ -54,6 +54,10 @@ class ResponseTable:
         plain = np.outer(weights, across).ravel() @ self.stack(self.base)
         return Response(self, log_p_m, log_speed, across, plain)
 
+    def knows(self, name: str) -> bool:
+        """Whether there are runs with an effect, fingerprints or others."""
+        return any(any(kept.get(name, {}).values()) for kept in (self.changes, self.fingerprints))
+
     def grade(self, name: str, amplitude: float) -> float:
         """Where an amplitude of an effect lies on the scale on which codes are interpolated."""
         return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude

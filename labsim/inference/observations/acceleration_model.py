@@ -5,14 +5,14 @@ is expected to show follows from the speeds at the ends of each stretch, without
 1/BINS of the stopping time, or single samples where these are longer, and the free flight is one, which shows the zero.
 
 Errors: noise; zero of each sensor (stated, one a drop); scale of each sensor (stated, one for all drops); contact time and
-speed (free); noise of the particles' force. docs/acceleration-accuracy.md has the figures.
+speed (free); noise of the particles' force; the solver's viscosity and spacing. docs/acceleration-errors.md has the figures.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
@@ -47,6 +47,8 @@ class AccelerationModel:
     table: ResponseTable
     start: Instant
     blunt: bool  # the tip has a face
+    # of the solver's own settings, which no dust has: the amplitude that is simulated, and the standard deviation of their error
+    numerics: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     # with an error of what a cause changes, of any size, its own campaigns of another code have less evidence
     # (benchmarks/acceleration_sizes.py)
     changes_differ: ClassVar[bool] = False
@@ -208,6 +210,10 @@ def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatA
     return np.where(clock < 0.0, impact + STANDARD_GRAVITY * clock, impact * (inside[:-1] / inside[-1]))
 
 
-def make_acceleration_model(observed: ObservedImpact, table: ResponseTable) -> AccelerationModel:
+def make_acceleration_model(
+    observed: ObservedImpact, table: ResponseTable, numerics: Mapping[str, tuple[float, float]]
+) -> AccelerationModel:
     start = Instant(observed.contact_time, math.log(observed.impact_speed), 0.0)
-    return AccelerationModel(observed, table, start, is_blunt(make_profile(observed.drop.projectile)))
+    return AccelerationModel(
+        observed, table, start, is_blunt(make_profile(observed.drop.projectile)), numerics
+    )

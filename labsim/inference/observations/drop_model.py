@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -32,6 +32,7 @@ class DropModel:
     start: Instant
     matrix: FloatArray
     changes_differ: ClassVar[bool] = True
+    numerics: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
     @property
     def radius(self) -> float:

@@ -161,6 +161,10 @@ def linearise_drop(
         * terms.numerical_slope,
         "numerical strength": by_strength * terms.numerical_strength,
     }
+    for setting, (amplitude, sigma) in model.numerics.items():
+        if model.table.knows(setting):
+            moved = model.predict(code + response.change(setting, amplitude), instrument, instant)
+            shared[f"numerical {setting}"] = (moved - here) * (sigma / amplitude)
     if with_others:
         shared[f"strength of {observed.drop.sample}"] = own_strength
 

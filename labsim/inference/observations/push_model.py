@@ -7,7 +7,7 @@ each record, a factor (the scatter of samples) and what the ground differs by al
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -44,6 +44,7 @@ class PushModel:
     ground: Ground
     first: int
     changes_differ: ClassVar[bool] = True
+    numerics: ClassVar[Mapping[str, tuple[float, float]]] = {}
     camera: None = None
     unit: str = "1"
     surface_sigma: float = 1.0
