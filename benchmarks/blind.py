@@ -7,7 +7,8 @@ names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaig
 
 gain is what the extension removes of what held-out drops show above the noise that is expected. What can be removed is what the
 hidden cause itself removes, at its true strength and p_m: "by truth" is its gain, "share" the part of the lowering of the mean
-square that the extension reaches.
+square that the extension reaches. "sigmas" is how strong the hidden cause is: the root of what it takes from χ² of the nominal
+fit, at its true strength and p_m.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from labelled import SCATTER
 from material_points.compare_changes import HIDDEN
 
 from labsim.campaign import read_campaign
@@ -97,7 +99,7 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
     """The gain of what is hidden, at its true strength and p_m, and the share of what that removes which the extension does."""
     bench, hidden = found.bench, read_hidden(truth)
     if not hidden or any(name not in bench.effects for name in hidden):
-        return {"by_truth": math.nan, "share": math.nan}
+        return {"by_truth": math.nan, "share": math.nan, "sigmas": math.nan}
     amplitudes = {}
     for name, (value, shape) in hidden.items():
         effect, label = bench.effects[name], name
@@ -111,7 +113,8 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
     before = found.gain.rms_nominal**2
     removed, removable = before - found.gain.rms_extended**2, before - true.rms_extended**2
     share = removed / removable if removable > LEAST_REMOVED * before else math.nan
-    return {"by_truth": true.fraction_removed, "share": share}
+    sigmas = math.sqrt(max(found.nominal.chi_square - fit.chi_square, 0.0))
+    return {"by_truth": true.fraction_removed, "share": share, "sigmas": sigmas}
 
 
 def score(rows: list[dict], truth: dict) -> pd.DataFrame:
@@ -145,6 +148,8 @@ def score(rows: list[dict], truth: dict) -> pd.DataFrame:
                 "sd": round(row["ln_p_m_sd"], 3),
                 "in 90 %": low <= known["pm"] <= high,
                 "gain": round(row["gain"], 2),
+                "scatter": known.get("scatter", SCATTER),
+                "sigmas": round(row["sigmas"], 1),
                 "by truth": round(row["by_truth"], 2),
                 "share": round(row["share"], 2),
                 "new runs": row["runs_new"],

@@ -27,6 +27,9 @@ class Filming:
     frame_factor: float = 1.0
     surface_error: float = 0.0  # px added to the stated row
     wobble: tuple[float, float] = (0.0, 1.0)  # px, Hz
+    line_time: float = 0.0  # s from one row to the next below it, where rows are read one after another
+    clock_drift: float = 0.0  # by which share the time between frames grows from contact to the end
+    noise_slope: float = 0.0  # by which share the noise grows from the first frame to the last
 
 
 class Result(Protocol):
@@ -62,10 +65,18 @@ def film(result: Result, speed: float, filming: Filming, rng: np.random.Generato
     frames = np.arange(first + int(filming.after * rate) + 1)
     time = (frames - contact) / rate
     surface = 300.0 + rng.uniform(-4.5, 3.5)
-    rows = surface + depth_at(result, time) / (filming.pixel_size * filming.pixel_factor)
+    time = time * (1.0 + 0.5 * filming.clock_drift * time / filming.after)
+    pixel = filming.pixel_size * filming.pixel_factor
+    below = depth_at(result, time) / pixel
+    if filming.line_time:
+        for _ in range(3):  # the tip is where it is when its own row is read
+            below = depth_at(result, time + filming.line_time * below) / pixel
+    rows = surface + below
     amplitude, frequency = filming.wobble
     rows = rows + amplitude * np.sin(2.0 * np.pi * (frequency * time + rng.uniform()))
-    rows = rows + rng.normal(0.0, ROW_SIGMA, rows.size)
+    rows = rows + rng.normal(0.0, ROW_SIGMA, rows.size) * (
+        1.0 + filming.noise_slope * (frames / frames[-1] - 0.5)
+    )
     stray = rng.uniform(size=rows.size) < OUTLIERS
     rows = rows + stray * rng.uniform(4.0, 9.0, rows.size) * rng.choice([-1.0, 1.0], rows.size)
     kept = rng.uniform(size=rows.size) >= MISSING

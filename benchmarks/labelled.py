@@ -27,6 +27,19 @@ SCATTER = 0.02  # of p_m from sample to sample, where the plan says no other
 WORDS = {"rate_n": "raten", "shear_factor": "yf", "gas_pressure": "pgas", "friction": "mu_f"}
 
 
+def format_toml(value: object) -> str:
+    """A value of a plan; numbers with four digits."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {format_toml(each)}" for key, each in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(format_toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(value) if isinstance(value, int) else f"{value:.4g}"
+
+
 def name_hidden(hidden: dict) -> dict:
     """What is hidden, in the words of the labelled campaigns' truth.json; words of its own where those have none."""
     dust = {WORDS.get(key, key): value for key, value in hidden.get("dust", {}).items()}
@@ -50,6 +63,7 @@ def name_hidden(hidden: dict) -> dict:
         "measure": hidden.get("measure", {}),
         "ct": hidden.get("ct", {}),
         "drift": hidden.get("drift", 0.0),
+        "scatter": hidden.get("scatter", SCATTER),
         "profile": profile,
         **sample,
     }

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from make_campaigns import make_campaign
+from make_campaigns import labelled, make_campaign
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
@@ -132,14 +132,6 @@ def aim(plan: dict, name: str, effect: Effect, size: float, drawn: int, folder: 
     return None
 
 
-def write(value: object) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {write(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(write, value)) + "]"
-    return f"{value:.4g}"
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -173,7 +165,9 @@ def main() -> None:
         print(f'[[campaign]]\nname = "f{asked.first + k}"\ncause = "{cause}"')
         print(f'note = "{SIGMAS:g} sigma, as {name} without it"')
         print(f"pm = {plan[name]['pm']}\nseed = {plan[name]['seed']}")
-        print("".join(f"{key} = {write(value)}\n" for key, value in hidden.items()), flush=True)
+        print(
+            "".join(f"{key} = {labelled.format_toml(value)}\n" for key, value in hidden.items()), flush=True
+        )
 
 
 if __name__ == "__main__":

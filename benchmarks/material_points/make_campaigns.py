@@ -9,16 +9,17 @@ second call makes what is missing. The plan says what is hidden in each (plan.to
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from drop import GRAVITY, SOLID, Body, Dust, Numerics, extrapolate_drop, run_drop
-from scan import write_scan
+from drop import GRAVITY, SOLID, Body, Dust, Numerics, extrapolate_drop, fill_factor_at, run_drop
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
 from film import HEIGHT_SIGMA, Filming, film, write_drop
 from labelled import SMALL
+from scan import write_scan
 
 BEAD = 2540.0 * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 LARGE = 1.5e-3  # m
@@ -119,8 +120,8 @@ def scan_beads(hidden: dict, folder: Path, rng: np.random.Generator) -> dict:
         result = run_drop(dust, body, speed, MAPPED, stop_factor=REST)
         blur = ct["blur_mm"] * 1e-3 if "blur_mm" in ct else None
         scans[f"C{k + 1:02d}"] = write_scan(
-            folder / "ct" / f"C{k + 1:02d}", result, dust, SMALL, mass, speed, SMALL / MAPPED.cells, rng,
-            ct.get("scale", 1.0), blur,
+            folder / "ct" / f"C{k + 1:02d}", result.points, partial(fill_factor_at, dust),
+            float(result.depth[-1]), SMALL, mass, speed, SMALL / MAPPED.cells, rng, ct.get("scale", 1.0), blur,
         )  # fmt: skip
     return scans
 

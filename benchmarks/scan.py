@@ -1,15 +1,16 @@
-"""Render horizontal CT slices of the dust and the bead in it from the material points at the stop."""
+"""Render horizontal CT slices of the dust and the bead in it, from points that carry volume and filling factor."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import tifffile
-from drop import SOLID, Dust, Result, fill_factor_at
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
+SOLID = 2000.0  # kg/m^3
 VOXEL = 40e-6  # m
 SLICES = 108
 SIZE = 104  # px
@@ -38,9 +39,13 @@ def deposit(r, z, volume, h, shape, z0):
     return total[1:]
 
 
-def map_density(result: Result, dust: Dust, radius: float, h: float):
-    """Density of the dust (kg/m^3) on an r-z grid: φ of the points there times the share of the room they fill."""
-    points = result.points
+def map_density(
+    points: np.ndarray, fill: Callable[[np.ndarray], np.ndarray], tip: float, radius: float, h: float
+):
+    """Density of the dust (kg/m^3) on an r-z grid: φ of the points there times the share of the room they fill.
+
+    points : (k, 4) r, z, volume, φ; fill : φ before the drop at a depth; tip : depth of the bead's lowest point. SI.
+    """
     top = radius * 1.5
     bottom = points[:, 1].min()
     z0 = np.floor(bottom / h) * h
@@ -54,7 +59,7 @@ def map_density(result: Result, dust: Dust, radius: float, h: float):
         indexing="ij",
     )
     everywhere = deposit(r.ravel(), z.ravel(), 2 * np.pi * r.ravel() * fine**2, h, shape, z0)
-    in_bead = np.hypot(r, z + result.depth[-1] - radius) < radius
+    in_bead = np.hypot(r, z + tip - radius) < radius
     bead = deposit(r[in_bead], z[in_bead], 2 * np.pi * r[in_bead] * fine**2, h, shape, z0)
     room = np.maximum(everywhere - bead, 0.05 * everywhere)
     with np.errstate(invalid="ignore"):
@@ -63,7 +68,7 @@ def map_density(result: Result, dust: Dust, radius: float, h: float):
     density = phi * SOLID * np.minimum(volume / (FULL * room), 1.0)
     # the last cells at the domain's edges are incomplete
     nodes_z = z0 + np.arange(shape[1]) * h
-    undisturbed = np.where(nodes_z < 0.0, fill_factor_at(dust, np.maximum(-nodes_z, 0.0)) * SOLID, 0.0)
+    undisturbed = np.where(nodes_z < 0.0, fill(np.maximum(-nodes_z, 0.0)) * SOLID, 0.0)
     density[:, :3] = undisturbed[:3]
     return RegularGridInterpolator(
         (np.arange(shape[0]) * h, nodes_z), density, bounds_error=False, fill_value=np.nan
@@ -71,19 +76,27 @@ def map_density(result: Result, dust: Dust, radius: float, h: float):
 
 
 def write_scan(
-    folder: Path, result: Result, dust: Dust, radius, mass, speed, h, rng, scale=1.0, blur=None
+    folder: Path,
+    points: np.ndarray,
+    fill: Callable[[np.ndarray], np.ndarray],
+    tip: float,
+    radius: float,
+    mass: float,
+    speed: float,
+    h: float,
+    rng: np.random.Generator,
+    scale: float = 1.0,
+    blur: float | None = None,
 ) -> dict:
-    """Write scan.toml and the slices; blur in m, the standard deviation of a Gaussian."""
+    """Write scan.toml and the slices. points, fill, tip, h : as in ``map_density``, tip where the bead rests; blur in m, the
+    standard deviation of a Gaussian."""
     (folder / "slices").mkdir(parents=True)
     axis = SIZE / 2 + rng.uniform(-5.0, 5.0, 2)  # x, y
-    tip = float(result.depth[-1])  # where it rests, above the deepest point it reached
     y, x, k = np.meshgrid(np.arange(SIZE), np.arange(SIZE), np.arange(SLICES), indexing="ij")
     r = np.hypot(x - axis[0], y - axis[1]) * VOXEL
     z = (SURFACE_SLICE - k) * VOXEL
-    density = map_density(result, dust, radius, h)(np.stack([r, z], axis=-1))
-    beyond = np.where(
-        z > 0.0, 0.0, np.where(z == 0.0, 0.5, 1.0) * fill_factor_at(dust, np.maximum(-z, 0.0)) * SOLID
-    )
+    density = map_density(points, fill, tip, radius, h)(np.stack([r, z], axis=-1))
+    beyond = np.where(z > 0.0, 0.0, np.where(z == 0.0, 0.5, 1.0) * fill(np.maximum(-z, 0.0)) * SOLID)
     density = np.where(np.isnan(density), beyond, density)
     across = np.sqrt(np.maximum(radius**2 - (z + tip - radius) ** 2, 0.0))
     covered = np.where(across > 0.0, np.clip(0.5 - (r - across) / VOXEL, 0.0, 1.0), 0.0)

@@ -1,0 +1,63 @@
+"""Count what verdicts on fresh campaigns are worth, with 90 % intervals.
+
+    python benchmarks/accuracy/count_verdicts.py TABLE.md ...
+
+TABLE.md is what ``benchmarks/blind.py --out`` writes of campaigns of a plan that fresh.py drew.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+from scipy.stats import beta
+
+sys.path.append(str(Path(__file__).parents[1]))
+from draw_accuracy import draw_reliability, read_table
+
+STRONG = 8.0  # standard deviations, from which a listed cause should be found
+BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
+
+
+def count(name: str, right: pd.Series) -> None:
+    """One row: how many of how many, and the interval of the share (Jeffreys)."""
+    hits, all_ = int(right.sum()), len(right)
+    low, high = beta.ppf([0.05, 0.95], hits + 0.5, all_ - hits + 0.5)
+    share = f"{100 * hits / all_:.0f} % ({100 * low:.0f} to {100 * high:.0f})" if all_ else ""
+    print(f"| {name} | {hits} of {all_} | {share} |")
+
+
+def main() -> None:
+    table = pd.concat([read_table(Path(path)) for path in sys.argv[1:]], ignore_index=True)
+    for column in ("exact", "class", "named", "wrong>0.5", "in 90 %"):
+        table[column] = table[column] == "True"
+    for column in ("scatter", "sigmas"):
+        table[column] = table[column].astype(float)
+    null, unlisted = table.hidden == "none", table.hidden == "unknown"
+    pair = table.hidden.str.contains(" + ", regex=False)
+    listed = ~null & ~unlisted & ~pair
+    strong = listed & (table.sigmas >= STRONG)
+    print("| what | how many | share (90 % interval) |\n|---|---|---|")
+    for low, high in BANDS:
+        some = null & (table.scatter > low) & (table.scatter <= high)
+        count(
+            f"nothing hidden, scatter {100 * low:g} to {100 * high:g} %: none", table["first"][some] == "none"
+        )
+    count(f"one listed cause of {STRONG:g} σ and more: it or its class first", table["class"][strong])
+    count("… among the at most three named", table["named"][strong])
+    count(
+        "… weaker: it or its class first, or none",
+        (table["class"] | (table["first"] == "none"))[listed & ~strong],
+    )
+    count("a pair: both named", table["exact"][pair])
+    quiet = (table["first"] == "unknown") | (table.P <= 0.5)
+    count("unlisted: unknown, or nothing above 0.5", quiet[unlisted])
+    count("all: a wrong cause above 0.5", table["wrong>0.5"])
+    count("p_m in its 90 % interval, nothing hidden", table["in 90 %"][null])
+    count("p_m in its 90 % interval, something hidden", table["in 90 %"][~null])
+    print(f"\nexpected calibration error {draw_reliability(table)[1]:.3f}")
+
+
+if __name__ == "__main__":
+    main()

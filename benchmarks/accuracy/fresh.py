@@ -1,0 +1,177 @@
+"""Draw a plan of campaigns that labsim has never been judged by: nothing hidden, listed causes, pairs, unlisted causes.
+
+    python benchmarks/accuracy/fresh.py --seed 20261127 > fresh.toml
+    python benchmarks/lagrangian_mesh/film_campaigns.py FOLDER --plan fresh.toml
+    OMP_NUM_THREADS=1 python benchmarks/blind.py FOLDER --out fresh.md
+    python benchmarks/accuracy/count_verdicts.py fresh.md
+
+The seed is drawn after the code that is judged is frozen. p_m is even in its logarithm from 700 to 2500 Pa, the scatter of p_m
+between samples from 1 to 10 %; half of the campaigns have two scans. A listed cause is as large as its prior says, without the
+half of the prior that is nearest to nothing. Sizes of unlisted causes are in KINDS. Campaigns stand in random order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from itertools import cycle
+from pathlib import Path
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).parents[1]))
+from labelled import format_toml
+
+from labsim.effects import list_effects
+
+P_M, SCATTER, NOISE_SLOPE = (700.0, 2500.0), (0.01, 0.10), 0.5
+OUTER = 0.5  # of a prior, that a cause is drawn from
+# effect -> table and key of a plan; the last three need scans
+LISTED = {
+    "shear_strength": ("dust", "shear_factor"),
+    "tensile_strength": ("dust", "tensile_factor"),
+    "strength_slope": ("dust", "delta"),
+    "bulk_modulus": ("dust", "bulk_modulus"),
+    "strength_rate": ("dust", "eta"),
+    "pore_gas": ("dust", "gas_pressure"),
+    "surface_crust": ("dust", "crust"),
+    "density_gradient": ("dust", "gradient"),
+    "filling_factor": ("dust", "filling_factor"),
+    "strength_ceiling": ("dust", "phi_2"),
+    "side_friction": ("body", "side"),
+    "sample_drift": ("", "drift"),
+    "projectile_mass": ("measure", "mass"),
+    "pixel_scale": ("measure", "pixel"),
+    "frame_rate": ("measure", "frame"),
+    "surface_row": ("measure", "surface_row"),
+    "ct_scale": ("ct", "scale"),
+    "ct_blur": ("ct", "blur_mm"),
+}
+NEED_SCANS = ("ct_scale", "ct_blur")
+SOFTEST = -0.025  # of φ in a crust: dust has no strength at φ1
+WEAKEST, MOST_GAS = 0.25, 8e3  # of a strength or a slope, Pa: what the mesh still follows
+
+Draw = Callable[[np.random.Generator], dict]
+
+
+def between(rng: np.random.Generator, low: float, high: float) -> float:
+    """Even in the logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def either(rng: np.random.Generator, low: float, high: float) -> float:
+    """The same, or one over it."""
+    return between(rng, low, high) ** rng.choice([-1.0, 1.0])
+
+
+# in no catalogue: what is hidden, for a tip of 0.5 mm, which some 0.7 mN stop
+KINDS: dict[str, Draw] = {
+    "drag of the tip with the square of the speed": lambda g: {"body": {"inertial": between(g, 2e-4, 8e-4)}},
+    "drag of the tip with the speed": lambda g: {"body": {"viscous": between(g, 1.3e-4, 5e-4)}},
+    "drag of the shaft with the square of the speed": lambda g: {
+        "body": {"shaft_drag": between(g, 1.0, 5.0)}
+    },
+    "a pull upwards": lambda g: {"body": {"pull": between(g, 5e-5, 2e-4)}},
+    "a film": lambda g: {"body": {"film": [between(g, 1e-4, 3e-4), between(g, 1e-4, 3e-4)]}},
+    "mass gathered with depth": lambda g: {"body": {"gathered": between(g, 0.1, 0.5)}},
+    "a thin strong or weak layer": lambda g: {
+        "dust": {"interface": [between(g, 1.5e-4, 4e-4), between(g, 1e-4, 2e-4), either(g, 2.0, 5.0)]}
+    },
+    "layers of the filling factor": lambda g: {
+        "dust": {"layers": [between(g, 0.005, 0.015), between(g, 0.3e-3, 1e-3)]}
+    },
+    "p_m by size": lambda g: {"small_strength": either(g, 1.15, 1.4)},
+    "shear weakens": lambda g: {
+        "dust": {"weakening": between(g, 0.2, 0.6), "weakening_shear": between(g, 0.1, 0.4)}
+    },
+    "shear hardens": lambda g: {"dust": {"hardening": between(g, 1.0, 5.0)}},
+    "a camera that wobbles": lambda g: {
+        "measure": {"wobble": [between(g, 0.4, 1.6), between(g, 150.0, 600.0)]}
+    },
+    "rows that are read one after another": lambda g: {"measure": {"line_time": between(g, 2e-6, 1e-5)}},
+    "a clock that drifts": lambda g: {
+        "measure": {"clock_drift": between(g, 0.05, 0.15) * float(g.choice([-1.0, 1.0]))}
+    },
+}
+
+
+def draw_listed(name: str, rng: np.random.Generator) -> dict:
+    """Keys of a plan that hide a listed cause."""
+    effect = list_effects(None)[name]
+    parameter = effect.amplitudes[0]
+    while True:
+        share = rng.uniform()
+        if parameter.prior.cdf(parameter.null) < 0.01:  # to one side alone
+            share = OUTER + (1.0 - OUTER) * share
+        else:
+            share = share * (1.0 - OUTER) if share < 0.5 else OUTER + (1.0 - OUTER) * share
+        value = float(parameter.prior.ppf(share))
+        inside = parameter.limits[0] <= value <= parameter.limits[1]
+        if name in ("shear_strength", "tensile_strength", "strength_slope"):
+            inside &= value > WEAKEST
+        if name == "pore_gas":
+            inside &= value < MOST_GAS
+        if name == "surface_crust":
+            inside &= value > SOFTEST
+        if inside:
+            break
+    table, key = LISTED[name]
+    if name == "ct_blur":
+        value *= 1e3
+    keys: dict = {key: value}
+    shapes = [each for each in effect.parameters if each.shape]
+    if shapes:
+        (shape,) = shapes
+        drawn = float(np.clip(shape.prior.sample(rng), *shape.limits))
+        keys = {key: [value, drawn]} if name == "surface_crust" else {key: value, "rate_n": drawn}
+    return {table: keys} if table else keys
+
+
+def join(one: dict, other: dict) -> dict:
+    """Keys of two causes in one campaign."""
+    both = dict(one)
+    for key, value in other.items():
+        both[key] = {**both[key], **value} if isinstance(both.get(key), dict) else value
+    return both
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seed", type=int, required=True)
+    for kind, count in (("nulls", 30), ("listed", 36), ("pairs", 8), ("unlisted", 28)):
+        parser.add_argument(f"--{kind}", type=int, default=count)
+    parser.add_argument("--letter", default="n")
+    asked = parser.parse_args()
+    rng = np.random.default_rng(asked.seed)
+
+    def deal(names: list[str], count: int) -> list[str]:
+        """Each as often as the others, in random order."""
+        order = cycle(rng.permutation(names))
+        return [str(next(order)) for _ in range(count)]
+
+    plan: list[dict] = [{"cause": "none"} for _ in range(asked.nulls)]
+    for name in deal(list(LISTED), asked.listed):
+        plan.append({"cause": name, **draw_listed(name, rng)})
+    for _ in range(asked.pairs):
+        pair = sorted(map(str, rng.choice(list(LISTED), 2, replace=False)))
+        plan.append({"cause": " + ".join(pair), **join(*(draw_listed(name, rng) for name in pair))})
+    for kind in deal(list(KINDS), asked.unlisted):
+        plan.append({"cause": "unknown", "note": kind, **KINDS[kind](rng)})
+    print(f"# benchmarks/accuracy/fresh.py --seed {asked.seed}")
+    for k, each in enumerate(plan[i] for i in rng.permutation(len(plan))):
+        drawn = {
+            "pm": round(between(rng, *P_M), -1),
+            "seed": int(rng.integers(2**31)),
+            "scatter": between(rng, *SCATTER),
+            "noise_slope": float(rng.uniform(-NOISE_SLOPE, NOISE_SLOPE)),
+            "scans": bool(rng.uniform() < 0.5) or any(name in each["cause"] for name in NEED_SCANS),
+        }
+        print(f'\n[[campaign]]\nname = "{asked.letter}{k + 1:03d}"')
+        print("\n".join(f"{key} = {format_toml(value)}" for key, value in {**each, **drawn}.items()))
+
+
+if __name__ == "__main__":
+    main()
