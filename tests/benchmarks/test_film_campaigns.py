@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-sys.path += [str(BENCHMARKS / folder) for folder in ("", "lagrangian_mesh", "accuracy")]
+sys.path.extend(str(BENCHMARKS / folder) for folder in ("", "lagrangian_mesh", "accuracy"))
 import film
 import film_campaigns
 import fresh
