@@ -9,10 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-sys.path.append(str(BENCHMARKS))
-sys.path.append(str(BENCHMARKS / "lagrangian_mesh"))
-sys.path.append(str(BENCHMARKS / "accuracy"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "lagrangian_mesh"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "accuracy"))
 import film
 import film_campaigns
 import fresh
