@@ -148,9 +148,11 @@ def scan_beads(hidden: dict, folder: Path, slower: float) -> dict:
         result = run(hidden, SMALL, mass * hidden.get("measure", {}).get("mass", 1.0), speed, own, bead=True)
         dust = Dust(p_m=own, **labelled.set_dust(hidden))
         h = SMALL / CELLS
+        # the bead that has bounced lies again on the dust that has sprung back
+        tip = -float(result.nodes_z[0, 0])
         label = f"C{k + 1:02d}"
         scans[label] = write_scan(
-            folder / "ct" / label, spread_points(result, h), dust.fill, float(result.depth[-1]), SMALL, mass,
+            folder / "ct" / label, spread_points(result, h), dust.fill, tip, SMALL, mass,
             speed, h, rng, ct.get("scale", 1.0), ct["blur_mm"] * 1e-3 if "blur_mm" in ct else None,
         )  # fmt: skip
     return scans
