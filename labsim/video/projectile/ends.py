@@ -49,10 +49,9 @@ def build_template(
                 scene.background,
                 usable,
                 shape,
-                top,
-                left,
-                *spot,
-                noise=scene.noise,
+                (top, left),
+                spot,
+                scene.noise,
                 ceiling=scene.limit,
                 known=template,
             )

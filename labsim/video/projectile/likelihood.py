@@ -33,15 +33,23 @@ def weigh_pixel(value: float, model: float, variance: float, ceiling: float) -> 
 
 @njit(cache=True)
 def accumulate(
-    c, wy, gy, wx, gx, row0, column0, h, w, image, ground, mask, theta, read_variance, gain, huber, ceiling
+    c, down, across, corner, shape, image, ground, mask, theta, noise, huber, ceiling
 ):  # pragma: no cover - compiled
     """Normal equations of one Gauss-Newton step: Fisher matrix (6, 6), right side (6,), and (χ², information kept,
-    information at hand, expected χ²). One pass over the pixels; the template's spline is evaluated on the way."""
+    information at hand, expected χ²). One pass over the pixels; the template's spline is evaluated on the way.
+
+    c : coefficients of the spline; down, across : (values, slopes), (5,) each, of its weights; corner : row and column of the
+    image's first pixel in the template; shape : rows and columns of the template; theta : (6,); noise : read variance, gain.
+    """
+    (wy, gy), (wx, gx) = down, across
+    row0, column0 = corner
+    h, w = shape
+    read_variance, gain = noise
     fisher, right, sums, slope = np.zeros((6, 6)), np.zeros(6), np.zeros(4), np.zeros(6)
     along, steep = np.empty(image.shape[1] + 4), np.empty(image.shape[1] + 4)
     clipped = ceiling < 1e30
     for i in range(image.shape[0]):
-        down = 2.0 * (row0 + i) / (h - 1) - 1.0
+        lower = 2.0 * (row0 + i) / (h - 1) - 1.0
         for j in range(image.shape[1] + 4):
             value = tilt = 0.0
             for k in range(5):
@@ -57,9 +65,9 @@ def accumulate(
                 m += wx[k] * along[j + k]
                 mx += gx[k] * along[j + k]
                 my += wx[k] * steep[j + k]
-            across = 2.0 * (column0 + j) / (w - 1) - 1.0
+            aside = 2.0 * (column0 + j) / (w - 1) - 1.0
             model = theta[2] * ground[i, j] * (1.0 - m) + theta[3] * m
-            light = model + theta[4] * down + theta[5] * across
+            light = model + theta[4] * lower + theta[5] * aside
             variance = max(read_variance + gain * max(model, 0.0), 1.0 / 12.0)
             residual, information, expected = (image[i, j] - light) / math.sqrt(variance), 1.0, 1.0
             if clipped:
@@ -72,7 +80,7 @@ def accumulate(
             score = trust * residual / math.sqrt(variance)
             lever = theta[3] - theta[2] * ground[i, j]
             slope[0], slope[1], slope[2] = lever * my, lever * mx, ground[i, j] * (1.0 - m)
-            slope[3], slope[4], slope[5] = m, down, across
+            slope[3], slope[4], slope[5] = m, lower, aside
             for p in range(6):
                 right[p] += score * slope[p]
                 for q in range(p, 6):

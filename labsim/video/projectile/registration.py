@@ -79,18 +79,15 @@ def register(
             image, ground, mask, rows, columns = region
         fisher, right, sums = accumulate(
             template.coefficients,
-            *spline_weights(float(dy)),
-            *spline_weights(float(dx)),
-            rows.start,
-            columns.start,
-            h,
-            w,
+            spline_weights(float(dy)),
+            spline_weights(float(dx)),
+            (rows.start, columns.start),
+            (h, w),
             image,
             ground,
             mask,
             theta,
-            noise.read_variance,
-            noise.gain,
+            (noise.read_variance, noise.gain),
             HUBER if robust else 1e9,
             ceiling,
         )

@@ -67,12 +67,8 @@ def sample_opacity(
     background: FloatArray,
     usable: np.ndarray,
     shape: tuple[int, int],
-    top: int,
-    left: int,
-    y: float,
-    x: float,
-    level: float,
-    brightness: float,
+    corner: tuple[int, int],
+    spot: tuple[float, float, float, float],
     noise: Noise,
     *,
     ceiling: float = np.inf,
@@ -80,10 +76,14 @@ def sample_opacity(
 ) -> tuple[FloatArray, FloatArray] | None:
     """Opacity and its weight on the template's whole grid around (y, x), by cubic interpolation; weight 0 outside.
 
+    shape : rows and columns of the grid; corner : of its first pixel from (y, x); spot : y, x, grey level of the projectile,
+    brightness of the picture over the background's.
     Where the picture stands at the ``ceiling``, what ``known`` says of the light above it takes its place: a spline
     through a clipped edge would ring, each sub-pixel phase in its own way.
     """
     h, w = shape
+    top, left = corner
+    y, x, level, brightness = spot
     oy, ox = round(y), round(x)
     sy, sx = y - oy, x - ox
     rows = np.arange(oy + top - PAD, oy + top + h + PAD)
