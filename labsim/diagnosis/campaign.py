@@ -323,7 +323,8 @@ def allow_for_codes(bench: Workbench, nominal: Fit, fit: Fit) -> Fit:
     that, and p_m makes up for it (docs/error-budget.md)."""
     if not any(bench.effects[name].kind == "material" for name in fit.hypothesis):
         return fit
-    return replace(fit, between_codes=bench.terms.change_of_strength * abs(fit.log_p_m - nominal.log_p_m))
+    beside = bench.terms.change_of_strength * abs(fit.log_p_m - nominal.log_p_m)
+    return replace(fit, between_codes=math.hypot(bench.terms.other_codes, beside))
 
 
 def check_leading(bench: Workbench, leading: Fit, rng: np.random.Generator) -> float:

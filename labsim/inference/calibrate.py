@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import truncnorm
 
 from ..calibrated import show_parameter
 from ..effects import list_effects
@@ -238,8 +239,8 @@ def sample_fit(
 ) -> Posterior:
     """emcee about a fit: parameters p_m_Pa and EFFECT.PARAMETER, flat prior in ln p_m, the effects' own priors.
 
-    Where the data leave the shape of the effect open, p_m is moved and widened by what it is with the others; beside a cause
-    of the material, by what another code would say.
+    p_m is moved and widened, inside its range, by what another code would say, and where the data leave the shape of the
+    effect open by what it is with the others.
     """
     target = make_target(bench, fit)
     if any(bench.costs_runs(name) for name in fit.hypothesis):
@@ -258,6 +259,7 @@ def sample_fit(
     if width > 0.0:
         name = posterior.names[0]
         p_m = posterior.data.posterior[name]
-        other = moved + width * np.random.default_rng(seed).standard_normal(p_m.shape)
-        posterior.data.posterior[name] = p_m * np.exp(other)
+        ends = ((np.log(end / p_m.values) - moved) / width for end in bench.campaign.p_m_range)
+        other = truncnorm.rvs(*ends, size=p_m.shape, random_state=np.random.default_rng(seed))
+        posterior.data.posterior[name] = p_m * np.exp(moved + width * other)
     return posterior

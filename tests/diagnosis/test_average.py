@@ -76,7 +76,7 @@ def test_beside_a_cause_of_the_material_p_m_may_be_what_another_code_says():
     bench = SimpleNamespace(effects=effects, terms=Terms())
     nominal = a_fit((), 900.0, 0.02)
     wide = allow_for_codes(bench, nominal, a_fit(("tensile_strength",), 1200.0, 0.05))
-    assert wide.between_codes == pytest.approx(0.4 * math.log(1200 / 900))
+    assert wide.between_codes == pytest.approx(math.hypot(Terms().other_codes, 0.4 * math.log(1200 / 900)))
     draws = average_p_m(Verdict("effect", [(("tensile_strength",), 1.0)]), nominal, [wide], RANGE)
     assert np.std(np.log(draws)) == pytest.approx(math.hypot(0.05, wide.between_codes), rel=0.02)
     assert np.mean(np.log(draws)) == pytest.approx(math.log(1200.0), abs=2e-3)

@@ -64,7 +64,9 @@ class Fit:
     # of ln p_m over the shapes of the effect that were fitted, by their evidence: mean minus this one's, standard deviation
     over_shapes: tuple[float, float] = (0.0, 0.0)
     unsettled: float = 0.0
-    between_codes: float = 0.0  # standard deviation of ln p_m that another code would say beside this cause
+    between_codes: float = (
+        0.0  # standard deviation of ln p_m that another code would say, beyond what is in the likelihood
+    )
 
     @property
     def drops(self) -> DropsBlock:
@@ -147,6 +149,7 @@ def fit_hypothesis(
         best.blocks,
         best.place.nuisances,
         unsettled=float(step.max()),
+        between_codes=bench.terms.other_codes,
     )
 
 
