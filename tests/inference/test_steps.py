@@ -11,6 +11,7 @@ from labsim.effects import Normal, Parameter
 from labsim.inference.calibrate import warn_unsettled
 from labsim.inference.fits import fitting, steps
 from labsim.inference.fits.blocks import Block
+from labsim.inference.observations.drop_terms import Terms
 
 RANGE = (300.0, 6000.0)
 
@@ -34,6 +35,7 @@ def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
         effects={"effect": SimpleNamespace(amplitudes=[parameter])},
         observations=[SimpleNamespace(begin=lambda: np.empty(0), follow=lambda own, block, left: (own, 0.0))],
         shape_evidence={},
+        terms=Terms(),
         costs_runs=lambda name: False,
         require_base_about=lambda log_p_m: None,
         seen=seen,

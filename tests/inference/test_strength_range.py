@@ -28,6 +28,10 @@ def test_a_range_without_the_truth_is_said_first(tmp_path, p_m_range):
     p_m = math.exp(found.fit.log_p_m)
     samples = found.posterior.samples("p_m_Pa")
     assert low * (1 - 1e-9) <= p_m <= high * (1 + 1e-9)
+    assert low * (1 - 1e-9) <= samples.min() and samples.max() <= high * (1 + 1e-9)
+    if (low, high) == (300.0, 6000.0):  # as wide as the fit and other codes together
+        wide = math.hypot(math.sqrt(found.fit.covariance[0, 0]), found.bench.terms.other_codes)
+        assert np.std(np.log(samples)) == pytest.approx(wide, rel=0.05)
     apart = min(abs(math.log(p_m / end)) for end in p_m_range) / math.sqrt(found.fit.covariance[0, 0])
     (tmp_path / "out").mkdir()
     _, lines = write_result(found, tmp_path / "out")
