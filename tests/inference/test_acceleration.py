@@ -18,6 +18,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.gain import predict_held_out
 from labsim.effects import Instrument
+from labsim.diagnosis.unlisted.unknown import fit_unknown, law_coordinates
 from labsim.inference.calibrate import calibrate, prepare
 from labsim.inference.emulation.curves import decode_speed, encode_speeds
 from labsim.inference.fits import steps
@@ -212,6 +213,21 @@ def test_what_a_setting_of_the_solver_changes_is_an_error_and_no_cause(tmp_path:
     added = block.covariance - fit_.blocks[0].covariance
     n = column.size
     assert added[:n, :n] == pytest.approx(np.outer(column, column), rel=1e-3, abs=1e-3 * np.max(column**2))
+
+
+def test_a_law_without_a_name_is_a_share_of_what_is_expected_not_of_what_is_recorded(tmp_path: Path) -> None:
+    """A share of the record, with p_m in balance, takes that share of its noise away: of a noisy campaign with nothing hidden
+    unknown had 0.99."""
+    noisy = accelerations.write_campaign(tmp_path / "c", noise=0.05)
+    bench, fit_ = prepare(read_campaign(noisy), laws.LawStore(tmp_path / "store"), workers=1)
+    reached = law_coordinates(bench, fit_)["reached"]
+    for model, instant in zip(bench.tracks.models, bench.tracks.instants(fit_.nuisances[0]), strict=True):
+        assert isinstance(model, AccelerationModel)
+        code = model.table.code(fit_.log_p_m, instant.log_speed, {})
+        here = np.where(model.below, np.maximum(model.predict(code, Instrument(), instant), 0.0), 0.0)
+        start = fit_.drops.sections[model.observed.name].start
+        assert reached[start : start + here.size] == pytest.approx(here, abs=1e-6 * here.max())
+    assert fit_unknown(bench, fit_).evidence < fit_.evidence
 
 
 @pytest.mark.parametrize("off", [-1.2, -0.5, 0.5, 1.2])

@@ -148,7 +148,8 @@ def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
         section = fit.drops.sections[model.observed.name]
         n = section.stop - section.start
         reached = np.zeros(n)
-        reached[: model.size.size] = model.size
+        count = model.data.size
+        reached[:count] = model.size(model.data - fit.drops.residual[section][:count])
         fraction = np.zeros(n)
         fraction[: model.way.size] = model.way
         parts["reached"].append(reached)

@@ -84,10 +84,10 @@ class AccelerationModel:
         impact = self.observed.impact
         return self.observed.begin > impact.contact_time + SHOWS_CONTACT * float(impact.time[-1])
 
-    @property
-    def size(self) -> FloatArray:
-        """What a law that is off by a share changes by that share, m/s²."""
-        return np.where(self.below, np.maximum(self.data, 0.0), 0.0)
+    def size(self, predicted: FloatArray) -> FloatArray:
+        """What a law that is off by a share changes by that share, m/s². Not of the data: with p_m in balance a share of them
+        takes as large a share of their noise away."""
+        return np.where(self.below, np.maximum(predicted, 0.0), 0.0)
 
     @property
     def way(self) -> FloatArray:

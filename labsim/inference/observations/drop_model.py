@@ -81,15 +81,15 @@ class DropModel:
         """What the other drops are asked to predict; free fall above says when contact is, and how fast."""
         return self.below
 
-    @property
-    def size(self) -> FloatArray:
+    def size(self, predicted: FloatArray) -> FloatArray:
         """What a law that is off by a share changes by that share, m."""
-        return np.maximum(self.data, 0.0)
+        return np.maximum(predicted, 0.0)
 
     @property
     def way(self) -> FloatArray:
         """Share of the way at each of the data."""
-        return self.size / self.size.max()
+        depth = np.maximum(self.data, 0.0)
+        return depth / depth.max()
 
     @property
     def deepest(self) -> float:

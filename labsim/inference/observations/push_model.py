@@ -73,10 +73,9 @@ class PushModel:
 
     held = below  # what the other records are asked to predict
 
-    @property
-    def size(self) -> FloatArray:
+    def size(self, predicted: FloatArray) -> FloatArray:
         """What a law that is off by a share changes by that share."""
-        return np.ones(self.data.size)
+        return np.ones(predicted.size)
 
     @property
     def way(self) -> FloatArray:
