@@ -17,8 +17,8 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.gain import predict_held_out
-from labsim.effects import Instrument
 from labsim.diagnosis.unlisted.unknown import fit_unknown, law_coordinates
+from labsim.effects import Instrument
 from labsim.inference.calibrate import calibrate, prepare
 from labsim.inference.emulation.curves import decode_speed, encode_speeds
 from labsim.inference.fits import steps
