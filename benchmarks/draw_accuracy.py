@@ -52,6 +52,12 @@ def draw_confusion(table: pd.DataFrame) -> plt.Figure:
     return figure
 
 
+def find_interval(right: int, of: int) -> tuple[float, float]:
+    """90 % interval of a share (Jeffreys)."""
+    low, high = beta.ppf([0.05, 0.95], right + 0.5, of - right + 0.5)
+    return float(low), float(high)
+
+
 def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
     """Share of right verdicts against the probability said, with 90 % intervals, and the expected calibration error."""
     figure, ax = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
@@ -63,8 +69,7 @@ def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
             continue
         right, all_ = int(inside.right.sum()), len(inside)
         said, true = inside.P.mean(), right / all_
-        ends = beta.ppf([0.05, 0.95], right + 0.5, all_ - right + 0.5)  # Jeffreys
-        ax.plot([said, said], ends, color="tab:blue", lw=1.2)
+        ax.plot([said, said], find_interval(right, all_), color="tab:blue", lw=1.2)
         ax.plot(said, true, "o", color="tab:blue")
         ax.annotate(
             f"{right} of {all_}", (said, true), (-6, 4), textcoords="offset points", ha="right", fontsize=8

@@ -38,6 +38,7 @@ class Result(Protocol):
     time: np.ndarray
     depth: np.ndarray
     speed: np.ndarray
+    stopping_time: float
     stopping_depth: float
 
 
@@ -84,21 +85,35 @@ def film(result: Result, speed: float, filming: Filming, rng: np.random.Generato
     return frames[kept], rows[kept], surface + rng.normal(0.0, SURFACE_SIGMA) + filming.surface_error
 
 
-def write_drop(
+def read_faults(measure: dict) -> dict:
+    """What a plan hides in the camera, as fields of ``Filming``."""
+    return {
+        "pixel_factor": measure.get("pixel", 1.0),
+        "frame_factor": measure.get("frame", 1.0),
+        "surface_error": measure.get("surface_row", 0.0),
+        "wobble": tuple(measure.get("wobble", (0.0, 1.0))),
+        "line_time": measure.get("line_time", 0.0),
+        "clock_drift": measure.get("clock_drift", 0.0),
+    }
+
+
+def film_drop(
     folder: Path,
-    frames,
-    rows,
-    surface,
-    *,
-    radius,
-    mass,
-    sequence,
-    height,
-    length,
+    result: Result,
+    speed: float,
     filming: Filming,
+    rng: np.random.Generator,
+    *,
+    radius: float,
+    mass: float,
+    sequence: int,
+    length: float,
     same_as: str = "",
 ) -> None:
-    """same_as : the drop of which this film is another record."""
+    """A drop's folder with its film and the height that it is said to have fallen. radius, length : m; mass : kg, as stated;
+    same_as : the drop of which this film is another record."""
+    frames, rows, surface = film(result, speed, filming, rng)
+    height = max(speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * rng.normal(), 1e-5)
     folder.mkdir(parents=True)
     lines = [f"{frame},{row:.3f}" for frame, row in zip(frames, rows, strict=True)]
     (folder / "track.csv").write_text("frame,tip_row_px\n" + "\n".join(lines) + "\n")

@@ -18,6 +18,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TypeVar
 
+import film
 import numpy as np
 
 Found = TypeVar("Found")
@@ -80,6 +81,16 @@ def draw_strength(hidden: dict, normal: float, order: float = 0.5) -> float:
     return own * (1.0 + hidden.get("drift", 0.0) * (order - 0.5))
 
 
+def name_drop(result: film.Result, speed: float, p_m: float) -> dict:
+    """The truth of one drop, in the words of the labelled campaigns' truth.json."""
+    return {
+        "true_v0": speed,
+        "true_depth": result.stopping_depth,
+        "true_stopping_time": result.stopping_time,
+        "p_m": p_m,
+    }
+
+
 @contextmanager
 def write_folder(out: Path, name: str):
     """A folder to write a campaign into, which takes its name when it is complete."""
@@ -138,15 +149,18 @@ relative_sigma = {sigma:g}
 
 
 def make_campaigns(
-    make: Callable[[tuple[dict, Path]], tuple[str, dict]], description: str | None, plan: Path, letter: str
+    make: Callable[[tuple[dict, Path]], tuple[str, dict]],
+    description: str | None,
+    plan: Path | None,
+    letter: str,
 ) -> None:
     """The command: every campaign of a plan that is missing in OUT. make : from what is hidden and OUT to name and truth; plan :
-    the one to take where none is given, its campaigns named after ``letter``."""
+    the one to take where none is given (None: one has to be), its campaigns named after ``letter``."""
     parser = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("out", type=Path)
-    parser.add_argument("--plan", type=Path, default=plan)
+    parser.add_argument("--plan", type=Path, default=plan, required=plan is None)
     parser.add_argument("--only", default="")
     parser.add_argument("--workers", type=int, default=1)
     arguments = parser.parse_args()

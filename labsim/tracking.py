@@ -81,7 +81,8 @@ def read_request(
     frame_rate: float | None = None,
     pixel_size: Measured | None = None,
     rod_diameter: Measured | None = None,
-    ruler: tuple[Path, float] | None = None,
+    ruler: Path | None = None,
+    ruler_step: float = 1e-3,
     surface_row: float | None = None,
     surface_row_sigma: float = SURFACE_SIGMA,
     row_sigma: float | None = None,
@@ -90,8 +91,7 @@ def read_request(
     columns: Mapping[str, str] | None = None,
     particle: str | None = None,
 ) -> Request:
-    """What the drop and the caller say, and the record opened; units as ``labsim.track`` has them. ruler : its picture, and how
-    far its ticks are apart (m).
+    """What the drop and the caller say, and the record opened; units as ``labsim.track`` has them.
 
     Raises MeasurementError, which names everything that is missing at once.
     """
@@ -100,7 +100,7 @@ def read_request(
         ("pixel_size", None if pixel_size is None else pixel_size.value),
         ("rod_diameter", None if rod_diameter is None else rod_diameter.value),
         ("row_sigma", row_sigma),
-        ("ruler_step", None if ruler is None else ruler[1]),
+        ("ruler_step", ruler_step),
     ):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise MeasurementError("command line", key, f"{value:g} is not a positive number")
@@ -144,7 +144,7 @@ def read_request(
             request.source, "DROP", "is no plain file and no folder; name a copy of the record"
         )
     if ruler is not None:
-        _take_ruler(request, *ruler)
+        _take_ruler(request, ruler, ruler_step)
     if find_format(request.source) is not None:
         request.points = read_points(request.source, particle, columns)
     else:

@@ -11,19 +11,18 @@ import sys
 from pathlib import Path
 
 import pandas as pd
-from scipy.stats import beta
 
 sys.path.append(str(Path(__file__).parents[1]))
-from draw_accuracy import draw_reliability, read_table
+from draw_accuracy import draw_reliability, find_interval, read_table
 
 STRONG = 8.0  # standard deviations, from which a listed cause should be found
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
 
 
 def count(name: str, right: pd.Series) -> None:
-    """One row: how many of how many, and the interval of the share (Jeffreys)."""
+    """One row: how many of how many, and the interval of the share."""
     hits, all_ = int(right.sum()), len(right)
-    low, high = beta.ppf([0.05, 0.95], hits + 0.5, all_ - hits + 0.5)
+    low, high = find_interval(hits, all_)
     share = f"{100 * hits / all_:.0f} % ({100 * low:.0f} to {100 * high:.0f})" if all_ else ""
     print(f"| {name} | {hits} of {all_} | {share} |")
 

@@ -23,11 +23,11 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1]))
 from labelled import format_toml
 
-from labsim.effects import list_effects
+from labsim.effects import Effect, list_effects
 
 P_M, SCATTER, NOISE_SLOPE = (700.0, 2500.0), (0.01, 0.10), 0.5
 OUTER = 0.5  # of a prior, that a cause is drawn from
-# effect -> table and key of a plan; the last three need scans
+# effect -> table and key of a plan
 LISTED = {
     "shear_strength": ("dust", "shear_factor"),
     "tensile_strength": ("dust", "tensile_factor"),
@@ -96,9 +96,9 @@ KINDS: dict[str, Draw] = {
 }
 
 
-def draw_listed(name: str, rng: np.random.Generator) -> dict:
+def draw_listed(effect: Effect, rng: np.random.Generator) -> dict:
     """Keys of a plan that hide a listed cause."""
-    effect = list_effects(None)[name]
+    name = effect.name
     parameter = effect.amplitudes[0]
     while True:
         share = rng.uniform()
@@ -145,7 +145,7 @@ def main() -> None:
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--letter", default="n")
     asked = parser.parse_args()
-    rng = np.random.default_rng(asked.seed)
+    rng, effects = np.random.default_rng(asked.seed), list_effects(None)
 
     def deal(names: list[str], count: int) -> list[str]:
         """Each as often as the others, in random order."""
@@ -154,10 +154,10 @@ def main() -> None:
 
     plan: list[dict] = [{"cause": "none"} for _ in range(asked.nulls)]
     for name in deal(list(LISTED), asked.listed):
-        plan.append({"cause": name, **draw_listed(name, rng)})
+        plan.append({"cause": name, **draw_listed(effects[name], rng)})
     for _ in range(asked.pairs):
         pair = sorted(map(str, rng.choice(list(LISTED), 2, replace=False)))
-        plan.append({"cause": " + ".join(pair), **join(*(draw_listed(name, rng) for name in pair))})
+        plan.append({"cause": " + ".join(pair), **join(*(draw_listed(effects[name], rng) for name in pair))})
     for kind in deal(list(KINDS), asked.unlisted):
         plan.append({"cause": "unknown", "note": kind, **KINDS[kind](rng)})
     print(f"# benchmarks/accuracy/fresh.py --seed {asked.seed}")

@@ -15,15 +15,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from mesh import BEAD_DENSITY, Dust, Forces, Numerics, Result, run_drop
+from mesh import BEAD, Dust, Forces, Numerics, Result, run_drop
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
-from film import GRAVITY, HEIGHT_SIGMA, Filming, film, write_drop
+from film import Filming, film_drop, read_faults
 from labelled import SMALL
 from scan import write_scan
 
-BEAD = BEAD_DENSITY * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 LARGE = 1.5e-3  # m
 P_M = 1300.0  # Pa, that the speeds below are stated for
 # radius (m), mass over a bead's, speed (m/s); the deepest of each projectile first, for it fails first
@@ -36,6 +35,9 @@ SERIES = (
 SCANS = (0.62, 0.36)  # m/s, of beads
 CELLS, DEPTH = 12.0, 7.0  # in a tip radius; tip radii
 AFTER, REST = 1.6, 2.0  # of the stopping time: for which a film goes on, after which a bead is scanned
+# of the radius, with which a force of a plan grows from SMALL on
+POWERS = {"side": 1, "shaft_drag": 1, "pull": 1, "viscous": 2, "inertial": 2, "film": 2}
+ON_SHAFT = ("side", "shaft_drag")
 SLOWER = (1.0, 0.8, 0.64, 0.5)
 DEEPEST = 1.8  # tip radii, that the mesh still serves to
 
@@ -46,15 +48,11 @@ class TooDeep(Exception):
 
 def run(hidden: dict, radius: float, mass: float, speed: float, p_m: float, *, bead: bool = False) -> Result:
     """One drop with what is hidden. Raises TooDeep."""
-    terms = dict(hidden.get("body", {}))
-    for name in ("side", "shaft_drag", "pull"):
-        if name in terms:
-            terms[name] *= radius / SMALL * (not (bead and name != "pull"))
-    for name in ("viscous", "inertial"):
-        if name in terms:
-            terms[name] *= (radius / SMALL) ** 2
-    if "film" in terms:
-        terms["film"] = terms["film"][0] * (radius / SMALL) ** 2, terms["film"][1]
+    terms = {}
+    for name, value in hidden.get("body", {}).items():
+        larger = (radius / SMALL) ** POWERS.get(name, 0)
+        if not (bead and name in ON_SHAFT):
+            terms[name] = (value[0] * larger, value[1]) if name == "film" else value * larger
     numerics = Numerics(cells=CELLS, depth=DEPTH)
     dust = Dust(p_m=p_m, **labelled.set_dust(hidden))
     try:
@@ -87,12 +85,11 @@ def spread_points(result: Result, h: float) -> np.ndarray:
     place = (1 - u) * ((1 - v) * corner[0] + v * corner[2]) + u * ((1 - v) * corner[1] + v * corner[3])
     # each of the points of a cell holds a share of its volume in proportion to its radius
     total = np.zeros(result.volume.shape)
-    cell = np.broadcast_arrays(i[:, None], j[None, :])
-    np.add.at(total, (cell[0], cell[1]), place[..., 0])
-    volume = result.volume[cell[0], cell[1]] * place[..., 0] / total[cell[0], cell[1]]
-    return np.column_stack(
-        [place[..., 0].ravel(), place[..., 1].ravel(), volume.ravel(), result.phi[cell[0], cell[1]].ravel()]
-    )
+    cell = np.ix_(i, j)
+    r, z = place[..., 0], place[..., 1]
+    np.add.at(total, cell, r)
+    volume = result.volume[cell] * r / total[cell]
+    return np.column_stack([each.ravel() for each in (r, z, volume, result.phi[cell])])
 
 
 def film_rods(hidden: dict, folder: Path, slower: float) -> dict:
@@ -111,28 +108,15 @@ def film_rods(hidden: dict, folder: Path, slower: float) -> dict:
             frame_rate=10e3 if radius == SMALL else 5e3,
             pixel_size=20e-6 if radius == SMALL else 40e-6,
             after=AFTER * result.stopping_time,
-            pixel_factor=measure.get("pixel", 1.0),
-            frame_factor=measure.get("frame", 1.0),
-            surface_error=measure.get("surface_row", 0.0),
-            wobble=tuple(measure.get("wobble", (0.0, 1.0))),
-            line_time=measure.get("line_time", 0.0),
-            clock_drift=measure.get("clock_drift", 0.0),
             noise_slope=hidden.get("noise_slope", 0.0),
+            **read_faults(measure),
         )
-        frames, rows, surface = film(result, speed, filming, rng)
-        height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * rng.normal()
         label = f"D{k + 1:02d}"
-        write_drop(
-            folder / "drops" / label, frames, rows, surface,
-            radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5),
-            length=4e-3 if radius == SMALL else 9e-3, filming=filming,
+        film_drop(
+            folder / "drops" / label, result, speed, filming, rng,
+            radius=radius, mass=mass, sequence=int(sequence[k]), length=4e-3 if radius == SMALL else 9e-3,
         )  # fmt: skip
-        drops[label] = {
-            "true_v0": speed,
-            "true_depth": result.stopping_depth,
-            "true_stopping_time": result.stopping_time,
-            "p_m": own,
-        }
+        drops[label] = labelled.name_drop(result, speed, own)
     return drops
 
 
@@ -171,13 +155,11 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 labelled.write_sample(
                     folder, name, description, nominal, nominal.filling_factor, nominal.solid
                 )
-            break
         except TooDeep:
             continue
-    else:
-        raise RuntimeError(f"{name}: drops go too deep for the mesh, however slow")
-    return name, {**labelled.name_hidden(hidden), "name": name, "drops": drops, "scans": scans}
+        return name, {**labelled.name_hidden(hidden), "name": name, "drops": drops, "scans": scans}
+    raise RuntimeError(f"{name}: drops go too deep for the mesh, however slow")
 
 
 if __name__ == "__main__":
-    labelled.make_campaigns(make_campaign, __doc__, Path(__file__).parent / "plan.toml", "n")
+    labelled.make_campaigns(make_campaign, __doc__, None, "n")

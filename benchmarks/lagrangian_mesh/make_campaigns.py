@@ -14,15 +14,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from feel import GRAVITY, SCALE_SIGMA, Sensing, write_felt
-from mesh import BEAD_DENSITY, Dust, Forces, Numerics, run_drop
+from feel import SCALE_SIGMA, Sensing, write_felt
+from mesh import BEAD, Dust, Forces, Numerics, run_drop
 from quadrilateral import find_strengths
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
-from film import HEIGHT_SIGMA, Filming, film, write_drop
+from film import Filming, film_drop
 
-BEAD = BEAD_DENSITY * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 CELLS = 16.0
 # radius (m), mass over a bead's, nominal speed (m/s)
 SERIES = (
@@ -77,19 +76,12 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 filming = Filming(
                     frame_rate=10e3, pixel_size=PIXELS * radius, after=1.5 * result.stopping_time
                 )
-                frames, rows, surface = film(result, speed, filming, beside)
-                height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * beside.normal()
-                write_drop(
-                    folder / "drops" / f"{label}-film", frames, rows, surface,
-                    radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5), length=9e-3,
-                    filming=filming, same_as="" if hidden["film"] == "alone" else label,
+                film_drop(
+                    folder / "drops" / f"{label}-film", result, speed, filming, beside,
+                    radius=radius, mass=mass, sequence=int(sequence[k]), length=9e-3,
+                    same_as="" if hidden["film"] == "alone" else label,
                 )  # fmt: skip
-            drops[label] = {
-                "true_v0": speed,
-                "true_depth": result.stopping_depth,
-                "true_stopping_time": result.stopping_time,
-                "p_m": own,
-            }
+            drops[label] = labelled.name_drop(result, speed, own)
         truth = Dust(p_m=hidden["pm"], **labelled.set_dust(hidden))
         for kind, sigma in hidden.get("tests", {}).items():
             stress = [find_strengths(phi, truth.law)[kind == "tension"] for phi in ROWS[kind]]

@@ -8,6 +8,7 @@ import numpy as np
 import quadrilateral
 
 BEAD_DENSITY = 2540.0  # kg/m^3
+BEAD = BEAD_DENSITY * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from drop import GRAVITY, SOLID, Body, Dust, Numerics, extrapolate_drop, fill_factor_at, run_drop
+from drop import SOLID, Body, Dust, Numerics, extrapolate_drop, fill_factor_at, run_drop
 
 sys.path.append(str(Path(__file__).parents[1]))
 import labelled
-from film import HEIGHT_SIGMA, Filming, film, write_drop
+from film import Filming, film_drop, read_faults
 from labelled import SMALL
 from scan import write_scan
 
@@ -82,27 +82,16 @@ def drop_rods(hidden: dict, folder: Path, rng: np.random.Generator) -> dict:
         result = extrapolate_drop(dust_of(hidden, own), body, speed, NUMERICS, stop_factor=1.12)
         assert result.stopping_time > 0.0, f"{hidden['name']} drop {k + 1} did not stop"
         label = f"D{k + 1:02d}"
-        drops[label] = {
-            "true_v0": speed,
-            "true_depth": result.stopping_depth,
-            "true_stopping_time": result.stopping_time,
-            "p_m": own,
-        }
+        drops[label] = labelled.name_drop(result, speed, own)
         filming = Filming(
             frame_rate=10000.0 if radius < 1e-3 else 5000.0,
             pixel_size=20e-6 if radius < 1e-3 else 40e-6,
             after=after,
-            pixel_factor=measure.get("pixel", 1.0),
-            frame_factor=measure.get("frame", 1.0),
-            surface_error=measure.get("surface_row", 0.0),
-            wobble=tuple(measure.get("wobble", (0.0, 1.0))),
+            **read_faults(measure),
         )
-        frames, rows, surface = film(result, speed, filming, rng)
-        height = speed**2 / (2.0 * GRAVITY) + HEIGHT_SIGMA * rng.normal()
-        write_drop(
-            folder / "drops" / label, frames, rows, surface,
-            radius=radius, mass=mass, sequence=int(sequence[k]), height=max(height, 1e-5),
-            length=4e-3 if radius < 1e-3 else 9e-3, filming=filming,
+        film_drop(
+            folder / "drops" / label, result, speed, filming, rng,
+            radius=radius, mass=mass, sequence=int(sequence[k]), length=4e-3 if radius < 1e-3 else 9e-3,
         )  # fmt: skip
     return drops
 

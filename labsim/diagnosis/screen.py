@@ -142,13 +142,7 @@ def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str
 
 def has_runs(bench: Workbench, name: str) -> bool:
     """Whether an effect's runs gave every projectile something to compare."""
-    return all(
-        any(
-            entry
-            for entry in (each.table.changes.get(name) or each.table.fingerprints.get(name, {})).values()
-        )
-        for each in bench.features
-    )
+    return all(each.table.knows(name) for each in bench.features)
 
 
 def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:

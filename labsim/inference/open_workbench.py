@@ -65,12 +65,12 @@ def open_workbench(
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
     refuse_others(campaign)
     drops = drops if drops is not None else observe_drops(campaign)[0]
+    if not drops:
+        raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     resolved, numerics, reasons = resolve_effects(
         campaign, effects, felt=any(isinstance(drop, ObservedImpact) for drop in drops)
     )
     errors = {name: (each.amplitudes[0].step, each.amplitudes[0].prior.sd) for name, each in numerics.items()}
-    if not drops:
-        raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
     families: list[Family] = []
     observations: list[Observation] = []
     models: list[RecordModel] = []

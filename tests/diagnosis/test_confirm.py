@@ -2,9 +2,11 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from labsim.diagnosis import campaign
+from labsim.inference.emulation.forward import ResponseTable
 
 
 def a_fit(name: str, evidence: float) -> SimpleNamespace:
@@ -65,8 +67,11 @@ def test_a_fit_less_likely_than_its_null_is_made_again_from_there(monkeypatch, f
 
 def test_a_cause_whose_runs_fail_is_said_not_to_be_judged():
     """Half the shear strength under a heavy projectile left a true cause without probability, and nobody was told."""
-    tables = [SimpleNamespace(changes={}, fingerprints={"pore_gas": {-2: {8000.0: 0.0}}}) for _ in range(2)]
-    for table, runs in zip(tables, ({-0.7: 0.0}, {}), strict=True):
+    tables = [
+        ResponseTable(np.zeros(1), (0,), fingerprints={"pore_gas": {-2: {8000.0: np.zeros((1, 2))}}})
+        for _ in range(2)
+    ]
+    for table, runs in zip(tables, ({-0.7: np.zeros((1, 2))}, {}), strict=True):
         table.fingerprints["shear_strength"] = {-2: runs}
     bench = SimpleNamespace(
         effects={
@@ -78,5 +83,5 @@ def test_a_cause_whose_runs_fail_is_said_not_to_be_judged():
     )
     (said,) = campaign.warn_failed(bench)
     assert said.startswith("shear_strength: is not judged")
-    tables[1].fingerprints["shear_strength"][-2] = {0.7: 0.0}
+    tables[1].fingerprints["shear_strength"][-2] = {0.7: np.zeros((1, 2))}
     assert campaign.warn_failed(bench) == []

@@ -55,8 +55,8 @@ class ResponseTable:
         return Response(self, log_p_m, log_speed, across, plain)
 
     def knows(self, name: str) -> bool:
-        """Whether there are runs with an effect, fingerprints or others."""
-        return any(any(kept.get(name, {}).values()) for kept in (self.changes, self.fingerprints))
+        """Whether some run says what an effect changes, fingerprints where there are no others."""
+        return any((self.changes.get(name) or self.fingerprints.get(name, {})).values())
 
     def grade(self, name: str, amplitude: float) -> float:
         """Where an amplitude of an effect lies on the scale on which codes are interpolated."""

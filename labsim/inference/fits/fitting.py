@@ -65,7 +65,7 @@ class Fit:
     over_shapes: tuple[float, float] = (0.0, 0.0)
     unsettled: float = 0.0
     between_codes: float = (
-        0.0  # standard deviation of ln p_m that another code would say, beyond what is in the likelihood
+        0.0  # standard deviation of ln p_m by which other codes differ beyond the likelihood's own
     )
 
     @property

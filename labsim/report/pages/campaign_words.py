@@ -183,5 +183,6 @@ def describe_numerics(error: dict[str, float], bench: Workbench) -> str:
         f"and {100 * bench.terms.numerical_change:.2g} % of what an effect changes of it, alike for like drops; in all drops "
         f"together {100 * bench.terms.numerical_slope:.2g} % for every factor of 2.7 in depth over tip radius, "
         f"{100 * bench.terms.numerical_strength:.2g} % of p_m, and a contact that is off by "
-        f"{100 * bench.terms.contact_offset:.2g} % of the tip radius."
+        f"{100 * bench.terms.contact_offset:.2g} % of the tip radius. p_m is told wider by "
+        f"{100 * bench.terms.other_codes:.2g} %, for other codes differ by more."
     )
