@@ -34,7 +34,7 @@ for part in $parts; do
     mutants) run env LABSIM_MUTANTS=1000 python -m pytest -q -s tests/faults/test_mutants.py ;;
     kills)
       for command in simulate calibrate diagnose track ct; do
-        run python benchmarks/kill_and_resume.py "$command" --kills 10 --seed "$(date +%j)"
+        run python -m benchmarks.faults.kill_and_resume "$command" --kills 10 --seed "$(date +%j)"
       done
       ;;
     versions) try_lowest_versions ;;

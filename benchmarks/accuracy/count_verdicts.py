@@ -1,8 +1,8 @@
 """Count what verdicts on fresh campaigns are worth, with 90 % intervals.
 
-    python benchmarks/accuracy/count_verdicts.py TABLE.md ...
+    python -m benchmarks.accuracy.count_verdicts TABLE.md ...
 
-TABLE.md is what ``benchmarks/blind.py --out`` writes of campaigns of a plan that fresh.py drew.
+TABLE.md is what ``benchmarks/accuracy/blind.py --out`` writes of campaigns of a plan that fresh.py drew.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-sys.path.append(str(Path(__file__).parents[1]))
-from draw_accuracy import draw_reliability, find_interval, read_table
+from benchmarks.accuracy.draw_accuracy import draw_reliability, find_interval, read_table
 
 STRONG = 8.0  # standard deviations, from which a listed cause should be found
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples

@@ -1,9 +1,9 @@
 """Draw a plan of campaigns that labsim has never been judged by: nothing hidden, listed causes, pairs, unlisted causes.
 
-    python benchmarks/accuracy/fresh.py --seed 20261127 > fresh.toml
-    python benchmarks/lagrangian_mesh/film_campaigns.py FOLDER --plan fresh.toml
-    OMP_NUM_THREADS=1 python benchmarks/blind.py FOLDER --out fresh.md
-    python benchmarks/accuracy/count_verdicts.py fresh.md
+    python -m benchmarks.accuracy.fresh --seed 20261127 > fresh.toml
+    python -m benchmarks.lagrangian_mesh.film_campaigns FOLDER --plan fresh.toml
+    OMP_NUM_THREADS=1 python -m benchmarks.accuracy.blind FOLDER --out fresh.md
+    python -m benchmarks.accuracy.count_verdicts fresh.md
 
 The seed is drawn after the code that is judged is frozen. p_m is even in its logarithm from 700 to 2500 Pa, the scatter of p_m
 between samples from 1 to 10 %; half of the campaigns have two scans. A listed cause is as large as its prior says, without the
@@ -13,16 +13,12 @@ half of the prior that is nearest to nothing. Sizes of unlisted causes are in KI
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from itertools import cycle
-from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parents[1]))
-from labelled import format_toml
-
+from benchmarks.campaigns.labelled import format_toml
 from labsim.effects import Effect, list_effects
 
 P_M, SCATTER, NOISE_SLOPE = (700.0, 2500.0), (0.01, 0.10), 0.5

@@ -1,6 +1,6 @@
 """What ``labsim check`` says of a campaign that is readable but wrong: one change a line, with what was said on 2026-11-22.
 
-    python benchmarks/faults/campaigns.py [CAMPAIGN] [--only REGEX] [--drops D05,D06] [--full] [--calibrate] [--keep DIR]
+    python -m benchmarks.faults.campaigns [CAMPAIGN] [--only REGEX] [--drops D05,D06] [--full] [--calibrate] [--keep DIR]
 
 CAMPAIGN (default data/campaigns/p01) gives its drops D05 and D06; each change is made to a copy of the two (those with
 "other" in their name: to D06 of the whole campaign), ``labsim check`` runs on the copy in this process, and what it says

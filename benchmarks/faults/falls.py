@@ -1,4 +1,4 @@
-"""Random falls with known figures through labsim's curve fit: python benchmarks/faults/falls.py [--number 500] [--seed 1].
+"""Random falls with known figures through labsim's curve fit: python -m benchmarks.faults.falls [--number 500] [--seed 1].
 
 The truth is integrated here, from laws of force or from an independent solver's curves (data/reference), not from the
 segments that the fit is made of. Half of the falls have 5 % spikes, a quarter rebound.

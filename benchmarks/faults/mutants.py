@@ -1,7 +1,7 @@
 """Mutants of every reader: each gives a result or one line, within 10 s, 2 GB, and no silent wrong number.
 
-    python benchmarks/faults/mutants.py                         3 000 mutants of all kinds
-    python benchmarks/faults/mutants.py --mutants 200 --kinds tiff cine --seed 2
+    python -m benchmarks.faults.mutants                         3 000 mutants of all kinds
+    python -m benchmarks.faults.mutants --mutants 200 --kinds tiff cine --seed 2
 
 labsim is imported once; each mutant is a forked process with limits on memory and CPU time. A mutant fails where it ends with
 another status than 0 or 2, says something else than one ``error:`` line, or takes 10 s of CPU more than twice the sound file;

@@ -1,7 +1,7 @@
 """CT scans with something wrong with them, whose truth is known: how far the map is off, and what labsim says of it.
 
-    python benchmarks/faults/scans.py                 # all cases: phantoms, then damaged stacks
-    python benchmarks/faults/scans.py "dark halo" swapped   # those whose name holds one of the words
+    python -m benchmarks.faults.scans                 # all cases: phantoms, then damaged stacks
+    python -m benchmarks.faults.scans "dark halo" swapped   # those whose name holds one of the words
 
 Phantoms: 110 x 104 x 104 voxels of 37 um, filling factor 0.15, a compacted zone of +0.10 below the bead, noise 0.03 a voxel,
 16 bits. chi2 is the mean of ((map - truth) / sigma)^2 over the cells of the zone (true excess above 0.02) outside the guard;

@@ -1,7 +1,7 @@
 """Sweeps that something stops: does the process end, how soon, with which words?
 
-    python benchmarks/faults/sweeps.py                    200 tries, some 8 minutes of two cores
-    python benchmarks/faults/sweeps.py --tries 36 --kinds raise     results of 100 kB and an error, the smallest case
+    python -m benchmarks.faults.sweeps                    200 tries, some 8 minutes of two cores
+    python -m benchmarks.faults.sweeps --tries 36 --kinds raise     results of 100 kB and an error, the smallest case
 
 Kinds: raise and worker-in-result run a sweep of 100 kB results that costs nothing (its status is Python's own, 1); full,
 worker, interrupt and term are ``labsim simulate`` with five spacings, with a quota on files, a worker killed, Ctrl-C and

@@ -1,6 +1,6 @@
 """Adverse recordings: how far the tracker's rows are off, what error bars it gives them, and what it says.
 
-    python benchmarks/faults/videos.py [CASE ...]
+    python -m benchmarks.faults.videos [CASE ...]
 
 Each case is one synthetic recording of the same drop: 90 frames, contrast 150, a rod 40 px wide, 2.3 px per frame at
 contact, rest after 30 frames, seed 1, rows of 20 um at 10 kHz; what the case does to it stands in the table ``CASES``. Pull is

@@ -12,9 +12,10 @@ have it for metals, which do not compact.
 from __future__ import annotations
 
 import numpy as np
-import quadrilateral
-from mesh import Dust, lay_mesh
 from scipy.integrate import solve_ivp
+
+from benchmarks.lagrangian_mesh import quadrilateral
+from benchmarks.lagrangian_mesh.mesh import Dust, lay_mesh
 
 
 def solve_cavity(dust: Dust) -> tuple[float, np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """Draw a plan of causes, each as large as eight standard deviations in its campaign.
 
-    python benchmarks/lagrangian_mesh/make_campaigns.py FOLDER --plan fresh.toml --only f51,f52
-    python benchmarks/lagrangian_mesh/draw_causes.py FOLDER f51,f52 --first 71 --seed 20261125 > more.toml
+    python -m benchmarks.lagrangian_mesh.make_campaigns FOLDER --plan fresh.toml --only f51,f52
+    python -m benchmarks.lagrangian_mesh.draw_causes FOLDER f51,f52 --first 71 --seed 20261125 > more.toml
 
 The campaigns named have nothing hidden. Of each a cause is drawn that is SIGMAS standard deviations strong: to the same drops
 without noise, its square is how much lower χ² of the best fit is with the cause than without. Where no size inside the cause's
@@ -19,8 +19,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from make_campaigns import labelled, make_campaign
 
+from benchmarks.lagrangian_mesh.make_campaigns import labelled, make_campaign
 from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
 from labsim.effects import Effect

@@ -1,6 +1,6 @@
 """One drop on a Lagrangian mesh, and what the dust at the tip is like at the stop.
 
-    python benchmarks/lagrangian_mesh/drop.py --speed 0.65,0.30 --tip-radius-mm 0.5 --cells 8,16
+    python -m benchmarks.lagrangian_mesh.drop --speed 0.65,0.30 --tip-radius-mm 0.5 --cells 8,16
 
 Speeds and cells may be lists; prints Markdown, a column a drop.
 """
@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from mesh import Dust, Numerics, Result, run_drop
-from tip import THRESHOLDS, measure_tip, print_table
+
+from benchmarks.lagrangian_mesh.mesh import Dust, Numerics, Result, run_drop
+from benchmarks.lagrangian_mesh.tip import THRESHOLDS, measure_tip, print_table
 
 STOPS = Path(__file__).parents[2] / "data" / "reference" / "independent_stops.csv"
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mesh import Result
+
+from benchmarks.lagrangian_mesh.mesh import Result
 
 REST = 20e-3  # s on the record before release
 AFTER = 1.0  # stopping times on the record after the stop

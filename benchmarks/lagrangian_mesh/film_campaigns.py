@@ -1,6 +1,6 @@
 """Make labelled campaigns on the Lagrangian mesh: thirteen filmed drops and two CT scans each.
 
-    python benchmarks/lagrangian_mesh/film_campaigns.py OUT --plan PLAN.toml [--only n01,n02] [--workers 1]
+    python -m benchmarks.lagrangian_mesh.film_campaigns OUT --plan PLAN.toml [--only n01,n02] [--workers 1]
 
 Writes OUT/n01, … (campaign folders, format 1) and OUT/truth.json; a folder appears when it is complete, and a second call makes
 what is missing. benchmarks/accuracy/fresh.py draws plans. Forces in a plan hold for a tip of 0.5 mm: on the side they grow with
@@ -11,17 +11,15 @@ where what is hidden makes dust so weak that the mesh does not serve, all drops 
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
-from mesh import BEAD, Dust, Forces, Numerics, Result, run_drop
 
-sys.path.append(str(Path(__file__).parents[1]))
-import labelled
-from film import Filming, film_drop, read_faults
-from labelled import SMALL
-from scan import write_scan
+from benchmarks.campaigns import labelled
+from benchmarks.campaigns.film import Filming, film_drop, read_faults
+from benchmarks.campaigns.labelled import SMALL
+from benchmarks.campaigns.scan import write_scan
+from benchmarks.lagrangian_mesh.mesh import BEAD, Dust, Forces, Numerics, Result, run_drop
 
 LARGE = 1.5e-3  # m
 P_M = 1300.0  # Pa, that the speeds below are stated for

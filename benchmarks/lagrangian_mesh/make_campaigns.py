@@ -1,6 +1,6 @@
 """Make labelled campaigns on the Lagrangian mesh: six drops each, which an accelerometer on the rod feels.
 
-    python benchmarks/lagrangian_mesh/make_campaigns.py OUT [--plan PLAN.toml] [--only a01,a02] [--workers 1]
+    python -m benchmarks.lagrangian_mesh.make_campaigns OUT [--plan PLAN.toml] [--only a01,a02] [--workers 1]
 
 Writes OUT/a01, OUT/a02, … (campaign folders, format 1) and OUT/truth.json; a folder appears when it is complete, and a second
 call makes what is missing. The plan says what is hidden in each (campaigns.toml beside this file). Drops are no deeper than the
@@ -10,17 +10,15 @@ call makes what is missing. The plan says what is hidden in each (campaigns.toml
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
-from feel import SCALE_SIGMA, Sensing, write_felt
-from mesh import BEAD, Dust, Forces, Numerics, run_drop
-from quadrilateral import find_strengths
 
-sys.path.append(str(Path(__file__).parents[1]))
-import labelled
-from film import Filming, film_drop
+from benchmarks.campaigns import labelled
+from benchmarks.campaigns.film import Filming, film_drop
+from benchmarks.lagrangian_mesh.feel import SCALE_SIGMA, Sensing, write_felt
+from benchmarks.lagrangian_mesh.mesh import BEAD, Dust, Forces, Numerics, run_drop
+from benchmarks.lagrangian_mesh.quadrilateral import find_strengths
 
 CELLS = 16.0
 # radius (m), mass over a bead's, nominal speed (m/s)

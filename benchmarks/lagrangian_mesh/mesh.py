@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import quadrilateral
+
+from benchmarks.lagrangian_mesh import quadrilateral
 
 BEAD_DENSITY = 2540.0  # kg/m^3
 BEAD = BEAD_DENSITY * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius

@@ -1,6 +1,6 @@
 """Set this solver beside another material-point solver: its table, its curves, the campaigns made with it.
 
-    python benchmarks/material_points/compare.py [--cells 8,12] [--curves] [--labelled FOLDER] [--drops D01,D03,…]
+    python -m benchmarks.material_points.compare [--cells 8,12] [--curves] [--labelled FOLDER] [--drops D01,D03,…]
 
 The other solver's figures: same equations and method, written by somebody else, at the same cells in a radius. FOLDER
 holds labelled campaigns and a truth.json with the hidden cause and each drop's true speed and depth.
@@ -16,7 +16,8 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-from drop import Body, Dust, Numerics, Result, run_drop
+
+from benchmarks.material_points.drop import Body, Dust, Numerics, Result, run_drop
 
 BEAD_DENSITY = 2540.0
 CURVES = Path(__file__).parents[2] / "data" / "reference" / "independent_curves.csv"

@@ -1,6 +1,6 @@
 """What a hidden effect changes of the depth, by labsim's solver and by the material points: by how much do two codes differ?
 
-    OMP_NUM_THREADS=1 python benchmarks/material_points/compare_changes.py FOLDER [--cells 5] [--rows ROWS.csv]
+    OMP_NUM_THREADS=1 python -m benchmarks.material_points.compare_changes FOLDER [--cells 5] [--rows ROWS.csv]
 
 FOLDER holds campaigns of make_campaigns.py and their truth.json, or others labelled alike. Every drop is run by labsim at its
 true speed and its sample's own p_m (where told), with what is hidden and without; ROWS.csv keeps that. On the campaigns with

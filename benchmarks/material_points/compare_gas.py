@@ -1,7 +1,7 @@
 """What trapped gas changes of a drop's depth, by labsim, the material points and the Lagrangian mesh, as they are refined.
 
-    OMP_NUM_THREADS=1 python benchmarks/material_points/compare_gas.py [--cells 8,12,16,24,32] [--spacings 5,8,12,16]
-    OMP_NUM_THREADS=1 python benchmarks/material_points/compare_gas.py --speed 0.3 --mesh 8,12,16,24 --cells 8,12,16
+    OMP_NUM_THREADS=1 python -m benchmarks.material_points.compare_gas [--cells 8,12,16,24,32] [--spacings 5,8,12,16]
+    OMP_NUM_THREADS=1 python -m benchmarks.material_points.compare_gas --speed 0.3 --mesh 8,12,16,24 --cells 8,12,16
 
 A bead of 0.5 mm radius at 0.65 m/s into dust of p_m 900 Pa and K0 45 kPa, with 5 and 12 kPa of gas that cannot leave. Cells and
 spacings in a radius. 32 cells take some four minutes a drop. The mesh tangles in soft dust with gas from about one radius on.
@@ -11,19 +11,15 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
-from compare import BEAD_DENSITY, drop_bead
-from drop import Dust
 
+from benchmarks.lagrangian_mesh import mesh
+from benchmarks.material_points.compare import BEAD_DENSITY, drop_bead
+from benchmarks.material_points.drop import Dust
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
-
-sys.path.append(str(Path(__file__).parents[1] / "lagrangian_mesh"))
-import mesh
 
 RADIUS, P_M, BULK = 0.5e-3, 900.0, 45e3
 PRESSURES = (5e3, 12e3)  # Pa

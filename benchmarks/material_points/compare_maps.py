@@ -1,6 +1,6 @@
 """Are the solver's errors of CT maps common to the scans of a campaign, and how large? Maps at the truth, by another code.
 
-    OMP_NUM_THREADS=1 python benchmarks/material_points/compare_maps.py FOLDER [--store STORE]
+    OMP_NUM_THREADS=1 python -m benchmarks.material_points.compare_maps FOLDER [--store STORE]
 
 FOLDER holds campaigns of make_campaigns.py and their truth.json, or others labelled alike. Each is linearised at its true p_m
 with what is hidden at its true strength: χ² of all its maps together, what their ln likelihood is more than with errors of each
@@ -14,8 +14,7 @@ import json
 import math
 from pathlib import Path
 
-from compare_changes import read_hidden
-
+from benchmarks.material_points.compare_changes import read_hidden
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.blocks import Block

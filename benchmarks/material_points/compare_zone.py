@@ -1,6 +1,6 @@
 """Set the dust under a bead at its stop, as this solver leaves it, beside labsim's SPH at several spacings.
 
-    python benchmarks/material_points/compare_zone.py [--cells 8,12,16]
+    python -m benchmarks.material_points.compare_zone [--cells 8,12,16]
 
 Prints, per case and solver: depth, what the dust holds more than before in volumes of dust that fill the bead, and φ - φ0 in
 thousandths within half a radius of the axis, by distance below the tip, and beside the bead.
@@ -11,8 +11,8 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from drop import Body, Dust, Numerics, run_drop
 
+from benchmarks.material_points.drop import Body, Dust, Numerics, run_drop
 from labsim.records import FloatArray, Material, Projectile
 from labsim.sph import DropSetting, simulate
 

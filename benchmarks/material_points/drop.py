@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import step
-from dust import find_unstressed, look_up, tabulate_strengths
+
+from benchmarks.material_points import step
+from benchmarks.material_points.dust import find_unstressed, look_up, tabulate_strengths
 
 SOLID = 2000.0  # kg/m^3
 GRAVITY = 9.81  # m/s^2

@@ -1,6 +1,6 @@
 """Make labelled campaigns with the material-point solver: 15 drops as tracks and two CT scans each.
 
-    python benchmarks/material_points/make_campaigns.py OUT [--plan PLAN.toml] [--only c01,c02] [--workers 1]
+    python -m benchmarks.material_points.make_campaigns OUT [--plan PLAN.toml] [--only c01,c02] [--workers 1]
 
 Writes OUT/c01, OUT/c02, … (campaign folders, format 1) and OUT/truth.json; a folder appears when it is complete, and a
 second call makes what is missing. The plan says what is hidden in each (plan.toml beside this file).
@@ -8,18 +8,24 @@ second call makes what is missing. The plan says what is hidden in each (plan.to
 
 from __future__ import annotations
 
-import sys
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from drop import SOLID, Body, Dust, Numerics, extrapolate_drop, fill_factor_at, run_drop
 
-sys.path.append(str(Path(__file__).parents[1]))
-import labelled
-from film import Filming, film_drop, read_faults
-from labelled import SMALL
-from scan import write_scan
+from benchmarks.campaigns import labelled
+from benchmarks.campaigns.film import Filming, film_drop, read_faults
+from benchmarks.campaigns.labelled import SMALL
+from benchmarks.campaigns.scan import write_scan
+from benchmarks.material_points.drop import (
+    SOLID,
+    Body,
+    Dust,
+    Numerics,
+    extrapolate_drop,
+    fill_factor_at,
+    run_drop,
+)
 
 BEAD = 2540.0 * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 LARGE = 1.5e-3  # m

@@ -13,8 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from dust import find_unstressed, look_up
 from numba import njit
+
+from benchmarks.material_points.dust import find_unstressed, look_up
 
 # columns of the points' array
 R, Z, VR, VZ, CRR, CRZ, CZR, CZZ, SRR, SZZ, STT, SRZ, PHI, PHI0, PHI_I, MASS, PRESSURE, STRENGTH, SLIP = (

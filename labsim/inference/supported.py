@@ -12,7 +12,8 @@ from ..records import Campaign, Motion
 from .emulation.grid import strength_node
 from .emulation.nodes import enclosing_nodes
 
-# laws whose friction ratio keeps to observations.sleeve_friction.SOLVER where the spacing is refined (benchmarks/sleeve.py)
+# laws whose friction ratio keeps to observations.sleeve_friction.SOLVER where the spacing is refined
+# (benchmarks/solver/sleeve.py)
 SHAFTS = ("von_mises",)
 INSTEAD = "labsim simulate --campaign CAMPAIGN --drop NAME simulates it"
 

@@ -3,19 +3,14 @@
 import sys
 import tomllib
 from dataclasses import fields
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "lagrangian_mesh"))
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "accuracy"))
-import film
-import film_campaigns
-import fresh
-import mesh
+from benchmarks.accuracy import fresh
+from benchmarks.campaigns import film
+from benchmarks.lagrangian_mesh import film_campaigns, mesh
 
 
 def test_a_plan_hides_what_the_mesh_and_the_camera_know(monkeypatch, capsys):

@@ -1,18 +1,14 @@
 """The Lagrangian mesh of benchmarks/ against closed forms, and one drop against the independent material points."""
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "lagrangian_mesh"))
-import mesh
-import quadrilateral
-from cavity import grow_cavity, solve_cavity
-from drop import find_limits
-from tip import measure_tip
+from benchmarks.lagrangian_mesh import mesh, quadrilateral
+from benchmarks.lagrangian_mesh.cavity import grow_cavity, solve_cavity
+from benchmarks.lagrangian_mesh.drop import find_limits
+from benchmarks.lagrangian_mesh.tip import measure_tip
 
 RADIUS = 0.5e-3
 DAMPING = np.array([0.02, 1.2, 0.1])

@@ -145,7 +145,7 @@ def test_real_soundings_come_first_and_their_cause_is_found(first: tuple[Path, s
     best = found["causes"][0]
     assert found["campaign"] == "tiller" and best["causes"] == ["strength_rate"]
     assert found["inclusion_probability"]["strength_rate"] >= 0.95
-    # a straight regression of ln net resistance on log10 of the speed: 0.141 a decade (benchmarks/soundings.py)
+    # a straight regression of ln net resistance on log10 of the speed: 0.141 a decade (benchmarks/accuracy/soundings.py)
     assert best["parameters"]["strength_rate.per_decade"]["q50"] == pytest.approx(0.141, abs=0.015)
     gain = found["gain"]
     assert gain["rms_extended"] < 0.5 * gain["rms_nominal"]

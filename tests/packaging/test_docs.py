@@ -40,6 +40,18 @@ def test_files_named_in_the_documentation_are_there() -> None:
     assert not [text for text in missing if text.split(": ")[1] not in recipes]
 
 
+def test_studies_named_in_the_documentation_can_be_run() -> None:
+    """Every ``python -m benchmarks.…`` of a page is a file with a main."""
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "benchmarks").rglob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages if page.name != "CHANGELOG.md")
+    named = set(re.findall(r"python\s+-m (benchmarks(?:\.\w+)+)", text))
+    assert len(named) > 40
+    files = {name: ROOT / f"{name.replace('.', '/')}.py" for name in named}
+    assert not [
+        name for name, file in files.items() if not file.exists() or "__main__" not in file.read_text()
+    ]
+
+
 def test_the_citation_is_complete() -> None:
     yaml = pytest.importorskip("yaml")
     import labsim

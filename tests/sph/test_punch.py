@@ -1,13 +1,10 @@
-"""A flat punch on cohesive matter against limit analysis, by benchmarks/flat_punch.py."""
+"""A flat punch on cohesive matter against limit analysis, by benchmarks/solver/flat_punch.py."""
 
 import math
-import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import flat_punch
+from benchmarks.solver import flat_punch
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
 FEWEST_SPEEDS = 3
 # of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time is off by up
-# to half a per cent and the force by one (benchmarks/acceleration_emulator.py). Drops nearer than SAME_SPEED share a node, one
+# to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Drops nearer than SAME_SPEED share a node, one
 # alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, math.sqrt(SPEED_RATIO)
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
@@ -37,13 +37,13 @@ COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than wha
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
-# of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration_error.py). Of fingerprints
-# too: with 6 spacings those of weak causes point elsewhere (benchmarks/fingerprint_spacing.py)
+# of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration/error.py). Of fingerprints
+# too: with 6 spacings those of weak causes point elsewhere (benchmarks/acceleration/fingerprint_spacing.py)
 FELT_CELLS = 8
 # a run's force is rough where its particles happen to lie: the mean over these factors on the spacing is compared
 FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
-# (benchmarks/effect_roughness.py)
+# (benchmarks/acceleration/effect_roughness.py)
 FELT_STEPS = 4.0
 SCAN_CELLS = 8  # of scans: the map needs more than the depth does
 

@@ -29,7 +29,7 @@ from .observe_acceleration import BINS, ObservedImpact
 # Of the largest deceleration, of a mean over 1/BINS of the stop, where the tip goes USUAL_DEPTH tip radii deep: how far the
 # simulated force is off from another code's. The fewer particles a tip passes the rougher its force: both grow as the depth to
 # the power -ROUGHER. The first is without memory; the second, over SHAPE_LENGTH of the stop, is alike in drops that go alike
-# deep. With the most evidence over campaigns of a Lagrangian mesh (benchmarks/acceleration_sizes.py) the first is 0.0032 and the
+# deep. With the most evidence over campaigns of a Lagrangian mesh (benchmarks/acceleration/sizes.py) the first is 0.0032 and the
 # second 0.0075, but then a law without a name gains from what is rough in single campaigns.
 FORCE_ROUGHNESS, FORCE_SHAPE, SHAPE_LENGTH = 0.0045, 0.010, 0.125
 FORCE_REACH = 0.28  # e-folds of depth over tip radius in which the second changes
@@ -50,7 +50,7 @@ class AccelerationModel:
     # of the solver's own settings, which no dust has: the amplitude that is simulated, and the standard deviation of their error
     numerics: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     # with an error of what a cause changes, of any size, its own campaigns of another code have less evidence
-    # (benchmarks/acceleration_sizes.py)
+    # (benchmarks/acceleration/sizes.py)
     changes_differ: ClassVar[bool] = False
     camera: None = None
     unit: str = "m/s^2"

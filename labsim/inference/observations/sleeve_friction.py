@@ -27,7 +27,7 @@ from . import RunFeatures, WithoutNuisances
 from .drop_terms import Probe, Terms
 from .observe_push import ObservedPush
 
-SOLVER = 0.20  # of the simulated ratio: spacing, a shaft shorter than a sleeve (benchmarks/sleeve.py)
+SOLVER = 0.20  # of the simulated ratio: spacing, a shaft shorter than a sleeve (benchmarks/solver/sleeve.py)
 USUAL = 0.10  # of the ratio, along the depth and from record to record: where too few records say it
 FEWEST = 4  # records, and windows that they share, which say it
 LEAST = 1e-4  # ratio that errors are shares of where a gauge's zero hides all of it

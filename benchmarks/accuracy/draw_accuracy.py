@@ -1,0 +1,99 @@
+"""Draw tables of ``blind.py``: which cause was named first for each that was hidden, how often a stated probability was right.
+
+    python -m benchmarks.accuracy.draw_accuracy DIR TABLE.md [TABLE.md ...]
+
+Writes DIR/confusion.png and DIR/reliability.png and prints the expected calibration error: the mean distance between the
+probability of the cause that stands first and the share of such verdicts that are right, over bins of that probability, weighted
+by their number.
+"""
+
+from __future__ import annotations
+
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from scipy.stats import beta
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+BINS = np.array([0.0, 0.5, 0.7, 0.9, 1.0])
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """The table in a file of ``blind.py --out``."""
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("|")]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in [lines[0], *lines[2:]]]
+    table = pd.DataFrame(rows[1:], columns=rows[0])
+    return table.assign(P=table.P.astype(float), right=table.hidden == table["first"])
+
+
+def draw_confusion(table: pd.DataFrame) -> plt.Figure:
+    """Rows: hidden; columns: named first; the number of campaigns in each cell."""
+    hidden = sorted(set(table.hidden), key=lambda name: (name not in ("none", "unknown"), name))
+    named = [*hidden, *sorted(set(table["first"]) - set(hidden))]
+    count = pd.crosstab(table.hidden, table["first"]).reindex(index=hidden, columns=named, fill_value=0)
+    figure, ax = plt.subplots(
+        figsize=(2.6 + 0.32 * len(named), 2.2 + 0.3 * len(hidden)), layout="constrained"
+    )
+    ax.imshow(count.to_numpy(), cmap="Blues", vmax=max(2, count.to_numpy().max()) * 1.5)
+    for (i, j), value in np.ndenumerate(count.to_numpy()):
+        if value:
+            ax.text(
+                j, i, value, ha="center", va="center", color="black" if hidden[i] == named[j] else "tab:red"
+            )
+    ax.set_xticks(range(len(named)), [name.replace("_", " ") for name in named], rotation=60, ha="right")
+    ax.set_yticks(range(len(hidden)), [name.replace("_", " ") for name in hidden])
+    ax.set(xlabel="named first", ylabel="hidden")
+    return figure
+
+
+def find_interval(right: int, of: int) -> tuple[float, float]:
+    """90 % interval of a share (Jeffreys)."""
+    low, high = beta.ppf([0.05, 0.95], right + 0.5, of - right + 0.5)
+    return float(low), float(high)
+
+
+def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
+    """Share of right verdicts against the probability said, with 90 % intervals, and the expected calibration error."""
+    figure, ax = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
+    ax.plot([0, 1], [0, 1], color="0.6", lw=1)
+    error = 0.0
+    for low, high in pairwise(BINS):
+        inside = table[(table.P > low) & (table.P <= high)]
+        if inside.empty:
+            continue
+        right, all_ = int(inside.right.sum()), len(inside)
+        said, true = inside.P.mean(), right / all_
+        ax.plot([said, said], find_interval(right, all_), color="tab:blue", lw=1.2)
+        ax.plot(said, true, "o", color="tab:blue")
+        ax.annotate(
+            f"{right} of {all_}", (said, true), (-6, 4), textcoords="offset points", ha="right", fontsize=8
+        )
+        error += all_ / len(table) * abs(said - true)
+    ax.set(
+        xlabel="probability of the cause that stands first",
+        ylabel="share that is right",
+        xlim=(0, 1.02),
+        ylim=(0, 1.02),
+    )
+    return figure, error
+
+
+def main() -> None:
+    folder, *paths = map(Path, sys.argv[1:])
+    table = pd.concat([read_table(path) for path in paths], ignore_index=True)
+    draw_confusion(table).savefig(folder / "confusion.png", dpi=110)
+    figure, error = draw_reliability(table)
+    figure.savefig(folder / "reliability.png", dpi=110)
+    print(
+        f"{len(table)} campaigns: first is right in {int(table.right.sum())}; expected calibration error {error:.3f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
