@@ -39,14 +39,15 @@ _PLACES = {
     "Material": "records",
     "Projectile": "records",
     "Camera": "records",
+    "Measured": "records",
     "DropSetting": "sph",
     "RunStore": "runs.store",
 }
 
 __all__ = [
-    "Camera", "DropSetting", "LabsimError", "Material", "Projectile", "RunStore", "__version__", "calibrate",
-    "diagnose", "example", "load", "plot", "plot_drops", "read_campaign", "reduce_scan", "simulate", "summarise",
-    "tabulate", "track", "write_report",
+    "Camera", "DropSetting", "LabsimError", "Material", "Measured", "Projectile", "RunStore", "__version__",
+    "calibrate", "diagnose", "example", "load", "plot", "plot_drops", "read_campaign", "reduce_scan", "simulate",
+    "summarise", "tabulate", "track", "write_report",
 ]  # fmt: skip
 
 

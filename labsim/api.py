@@ -39,14 +39,10 @@ def track(
     source: Path | str | Drop | npt.NDArray[np.generic],
     *,
     frame_rate: float | None = None,
-    pixel_size: float | None = None,
-    pixel_size_sigma: float = 0.0,
-    rod_diameter: float | None = None,
-    rod_diameter_sigma: float = 0.0,
-    ruler: Path | str | None = None,
-    ruler_step: float = 1e-3,
-    surface_row: float | None = None,
-    surface_row_sigma: float = 0.15,
+    pixel_size: float | Measured | None = None,
+    rod_diameter: float | Measured | None = None,
+    ruler: Path | str | tuple[Path | str, float] | None = None,
+    surface_row: float | Measured | None = None,
     row_sigma: float | None = None,
     rotate: int = 0,
     frames: tuple[int, int] | None = None,
@@ -56,30 +52,56 @@ def track(
 ) -> tuple[Track, DecelerationCurve | None]:
     """Follow a projectile, or read a finished track, and fit its motion.
 
-    source : a drop of a campaign, its folder, a video, a folder of pictures, a track file of any format labsim reads, or the
-    pictures as an array (frames, rows, columns) of uint8 or uint16, row 0 at the top.
-    frame_rate : Hz. pixel_size and its sigma : m. rod_diameter and its sigma : m, of a rod or bead that gives the scale.
-    ruler : picture of one, with ticks every ruler_step (m). surface_row, surface_row_sigma, row_sigma : px, rows grow downwards.
-    rotate : degrees, anticlockwise. frames : first and last picture to use. columns : what a table's columns are, as
-    {"time_ms": "t", "depth_mm": "z"}. particle : which of several tracks. What is left out comes from the drop, or for a video
-    from its own pictures (surface).
+    What is left out comes from the drop, or for a video from its own pictures.
 
-    Returns the track (rows, px) and the deceleration curve (SI, time zero at contact); of a video without scale, surface or
-    contact the track and None, with the reason among its warnings. Raises MeasurementError where something is not known or
-    nothing can be tracked.
+    Parameters
+    ----------
+    source : Drop, path or array
+        A drop of a campaign, its folder, a video, a folder of pictures, a track file of any format labsim reads, or the
+        pictures as an array (frames, rows, columns) of uint8 or uint16, row 0 at the top.
+    frame_rate : float, optional
+        Hz.
+    pixel_size, rod_diameter : float or Measured, optional
+        m; of a pixel in the plane of the fall, of a rod or bead that gives the scale. A Measured says how well it is known.
+    ruler : path, or path and float, optional
+        Picture of a ruler with ticks a millimetre apart, or that and the distance of its ticks in m.
+    surface_row : float or Measured, optional
+        px; rows grow downwards. A plain number is known to 0.15 px.
+    row_sigma : float, optional
+        px; how well the rows of a table are known.
+    rotate : int
+        Degrees, anticlockwise, in steps of 90.
+    frames : (int, int), optional
+        First and last picture to use.
+    columns : mapping, optional
+        What a table's columns are, as ``{"time_ms": "t", "depth_mm": "z"}``.
+    particle : str, optional
+        Which of several tracks.
+    progress : callable, optional
+        Called with what is done and what there is.
+
+    Returns
+    -------
+    Track, DecelerationCurve or None
+        Rows in px, and the curve in SI with time zero at contact. A video without scale, surface or contact has no curve; the
+        reason is among the track's warnings.
+
+    Raises
+    ------
+    MeasurementError
+        Where something is not known or nothing can be tracked.
     """
-    from .tracking import measure, read_request
+    from .tracking import SURFACE_SIGMA, measure, read_request
 
+    picture, step = ruler if isinstance(ruler, tuple) else (ruler, 1e-3)
     with _on_disk(source, "frames") as record:
         request = read_request(
             record,
             frame_rate=frame_rate,
-            pixel_size=None if pixel_size is None else Measured(pixel_size, pixel_size_sigma),
-            rod_diameter=None if rod_diameter is None else Measured(rod_diameter, rod_diameter_sigma),
-            ruler=None if ruler is None else Path(ruler),
-            ruler_step=ruler_step,
-            surface_row=surface_row,
-            surface_row_sigma=surface_row_sigma,
+            pixel_size=_with_error(pixel_size),
+            rod_diameter=_with_error(rod_diameter),
+            ruler=None if picture is None else (Path(picture), step),
+            surface_row=_with_error(surface_row, SURFACE_SIGMA),
             row_sigma=row_sigma,
             rotate=rotate,
             frames=frames,
@@ -436,6 +458,10 @@ def tabulate(thing: object) -> pd.DataFrame:
     raise TypeError(
         f"{type(thing).__name__} is no table; give a track, curve, volume, run, calibration or diagnosis"
     )
+
+
+def _with_error(value: float | Measured | None, sigma: float = 0.0) -> Measured | None:
+    return value if value is None or isinstance(value, Measured) else Measured(value, sigma)
 
 
 @contextmanager

@@ -38,7 +38,6 @@ class Request:
     frame_rate: float | None = None
     pixel_size: Measured | None = None
     surface: Measured | None = None
-    surface_sigma: float = SURFACE_SIGMA
     row_sigma: float | None = None
     rod_diameter: Measured | None = None
     points: tuple[str, Points] | None = None
@@ -81,10 +80,8 @@ def read_request(
     frame_rate: float | None = None,
     pixel_size: Measured | None = None,
     rod_diameter: Measured | None = None,
-    ruler: Path | None = None,
-    ruler_step: float = 1e-3,
-    surface_row: float | None = None,
-    surface_row_sigma: float = SURFACE_SIGMA,
+    ruler: tuple[Path, float] | None = None,
+    surface_row: Measured | None = None,
     row_sigma: float | None = None,
     rotate: int = 0,
     frames: tuple[int, int] | None = None,
@@ -100,19 +97,17 @@ def read_request(
         ("pixel_size", None if pixel_size is None else pixel_size.value),
         ("rod_diameter", None if rod_diameter is None else rod_diameter.value),
         ("row_sigma", row_sigma),
-        ("ruler_step", ruler_step),
+        ("ruler_step", None if ruler is None else ruler[1]),
     ):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise MeasurementError("command line", key, f"{value:g} is not a positive number")
-    surface = None if surface_row is None else Measured(surface_row, surface_row_sigma)
     drop = _find_drop(source)
     request = Request(
         source=Path(source) if not isinstance(source, Drop) else Path(),
         drop=drop,
         frame_rate=frame_rate,
         pixel_size=pixel_size,
-        surface=surface,
-        surface_sigma=surface_row_sigma,
+        surface=surface_row,
         row_sigma=row_sigma,
         rod_diameter=rod_diameter,
         scale_source=None if pixel_size is None else "stated",
@@ -131,7 +126,7 @@ def read_request(
         request.source = drop.record.path
         request.frame_rate = frame_rate or camera.frame_rate
         request.pixel_size = pixel_size or Measured(camera.pixel_size, 0.0)
-        request.surface = surface or Measured(camera.surface_row, camera.surface_row_sigma)
+        request.surface = surface_row or Measured(camera.surface_row, camera.surface_row_sigma)
         request.row_sigma = row_sigma or drop.record.row_sigma
         request.scale_source = "stated"
         request.region, request.left_out = drop.record.region, drop.record.left_out
@@ -144,7 +139,7 @@ def read_request(
             request.source, "DROP", "is no plain file and no folder; name a copy of the record"
         )
     if ruler is not None:
-        _take_ruler(request, ruler, ruler_step)
+        _take_ruler(request, *ruler)
     if find_format(request.source) is not None:
         request.points = read_points(request.source, particle, columns)
     else:
@@ -202,7 +197,7 @@ def _read_table(request: Request) -> Track:
     if points.row is None and (request.pixel_size is None or request.surface is None):
         request.scale_source = "stated" if request.pixel_size else "table"
         request.pixel_size = request.pixel_size or Measured(NOMINAL_PIXEL, 0.0)
-        request.surface = request.surface or Measured(0.0, request.surface_sigma)
+        request.surface = request.surface or Measured(0.0, SURFACE_SIGMA)
         request.warnings.append(
             f"the table gives lengths: as rows, 1 px is {1e6 * request.pixel_size.value:g} µm and the surface is row "
             f"{request.surface.value:g} ± {request.surface.sigma:g}"

@@ -10,7 +10,7 @@ import typer
 from ..campaign import read_campaign
 from ..errors import LabsimError, MeasurementError
 from ..records import Measured
-from ..tracking import Request, measure, read_request
+from ..tracking import SURFACE_SIGMA, Request, measure, read_request
 from ..tracks.table import read_mapping
 from . import options
 from ._many import Item, finish_many, measure_many
@@ -55,15 +55,15 @@ def track(
         Path | None, typer.Option("--ruler", help="Picture of a ruler in the plane of the fall.")
     ] = None,
     ruler_step_mm: Annotated[
-        float, typer.Option("--ruler-step-mm", help="Distance of the ruler's ticks.")
-    ] = 1.0,
+        float | None, typer.Option("--ruler-step-mm", help="Distance of the ruler's ticks. Default: 1.")
+    ] = None,
     surface_row: Annotated[
         float | None,
         typer.Option("--surface-row", help="Row of the undisturbed surface (px). Default: found."),
     ] = None,
     surface_row_sigma: Annotated[
-        float, typer.Option("--surface-row-sigma", min=0.0, help="Its uncertainty.")
-    ] = 0.15,
+        float | None, typer.Option("--surface-row-sigma", min=0.0, help="Its uncertainty. Default: 0.15.")
+    ] = None,
     row_sigma: Annotated[
         float | None,
         typer.Option("--row-sigma", help="Uncertainty of a row of a track.csv (px). Default: measured."),
@@ -158,6 +158,12 @@ def _track(request: Request, folder: Path, progress: options.Progress | None) ->
 
 def ask(source: Path, given: dict[str, Any]) -> Request:
     """The options of the command line as ``read_request`` takes them; its complaints in their names."""
+    for of, what in (("ruler_step_mm", "ruler"), ("surface_row_sigma", "surface_row")):
+        if given[of] is not None and given[what] is None:
+            name, option = (f"--{each.replace('_', '-')}" for each in (of, what))
+            raise LabsimError("command line", name, f"says more about {option}; give that too")
+    step = 1.0 if given["ruler_step_mm"] is None else given["ruler_step_mm"]
+    sigma = SURFACE_SIGMA if given["surface_row_sigma"] is None else given["surface_row_sigma"]
     mapping = None
     if given["columns"] is not None:
         try:
@@ -170,10 +176,8 @@ def ask(source: Path, given: dict[str, Any]) -> Request:
             frame_rate=given["fps"],
             pixel_size=_take(given["pixel_um"], given["pixel_um_sigma"], 1e-6),
             rod_diameter=_take(given["rod_diameter_mm"], given["rod_diameter_sigma_mm"], 1e-3),
-            ruler=given["ruler"],
-            ruler_step=1e-3 * given["ruler_step_mm"],
-            surface_row=given["surface_row"],
-            surface_row_sigma=given["surface_row_sigma"],
+            ruler=None if given["ruler"] is None else (given["ruler"], 1e-3 * step),
+            surface_row=_take(given["surface_row"], sigma, 1.0),
             row_sigma=given["row_sigma"],
             rotate=given["rotate"],
             frames=None if given["part"] is None else read_range(given["part"]),

@@ -14,7 +14,7 @@ from ..campaign import read_drop
 from ..errors import LabsimError, MeasurementError
 from ..records import STANDARD_GRAVITY, Drop, Measured
 from ..tables import Document
-from ..tracking import Request, Tracked, measure, read_request
+from ..tracking import SURFACE_SIGMA, Request, Tracked, measure, read_request
 from .record import RecordView, say, take_finite
 
 WAIT = 60.0  # s for a frame that is still being read
@@ -105,14 +105,15 @@ class DropView(RecordView):
         if not self.alone:
             return read_request(self._read_drop())
         values = self._read_alone()
-        pixel, sigma = values["camera.pixel_size_um"], values[self._sigma_key]
-        stated = {} if sigma is None else {"surface_row_sigma": sigma}
+        pixel, surface = values["camera.pixel_size_um"], values["camera.surface_row_px"]
+        sigma = values[self._sigma_key]
         request = read_request(
             self.path,
             frame_rate=values["camera.frame_rate_Hz"],
             pixel_size=None if pixel is None else Measured(1e-6 * pixel, 0.0),
-            surface_row=values["camera.surface_row_px"],
-            **stated,
+            surface_row=None
+            if surface is None
+            else Measured(surface, SURFACE_SIGMA if sigma is None else sigma),
         )
         request.region = values["record.region_px"]
         request.left_out = values["record.frames_left_out"] or ()

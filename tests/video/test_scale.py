@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+import labsim
 from labsim.cli import main
 from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 
@@ -83,6 +84,40 @@ def test_scales_that_disagree_are_said(tmp_path, capsys, drop) -> None:
     text = " ".join(summary["warnings"])
     assert "the ruler gives" in text and "the rod diameter gives" in text
     assert summary["pixel_size_source"] == "stated" and len(summary["pixel_size_measured_m"]) == 2
+
+
+def test_the_error_of_a_scale_is_the_same_by_script_and_by_command(tmp_path, capsys, drop) -> None:
+    _, _, video, _ = drop
+    by_command = measure(
+        capsys, tmp_path / "out", video, "--pixel-um", 1e6 * PIXEL, "--pixel-um-sigma", 1e4 * PIXEL
+    )
+    _, curve = labsim.track(
+        video, frame_rate=RATE, pixel_size=labsim.Measured(PIXEL, 0.01 * PIXEL), surface_row=280.0
+    )
+    assert curve.penetration_depth.sigma == pytest.approx(by_command["penetration_depth_m_sigma"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("option", "needs"), [("--ruler-step-mm", "--ruler"), ("--surface-row-sigma", "--surface-row")]
+)
+def test_what_says_more_about_nothing_is_refused(tmp_path, capsys, drop, option, needs) -> None:
+    _, _, video, _ = drop
+    arguments = (
+        "track",
+        video,
+        "--fps",
+        RATE,
+        "--pixel-um",
+        1e6 * PIXEL,
+        option,
+        2.0,
+        "-o",
+        tmp_path / "out",
+    )
+    with pytest.raises(SystemExit) as stop:
+        main([str(each) for each in arguments])
+    assert stop.value.code == 2
+    assert f"{option}: says more about {needs}" in capsys.readouterr().err
 
 
 def test_no_scale_no_curve(tmp_path, capsys, drop) -> None:
