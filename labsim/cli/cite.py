@@ -1,8 +1,15 @@
-"""``labsim cite``: BibTeX of what a result rests on."""
+"""``labsim cite``: BibTeX of what a result rests on.
+
+Effects, terms and material laws name a reference as a paper does, by author and year: "Blum & Schräpler (2004)". The key of the
+entry in references.bib is the first author's name in plain letters and the year, so that it is found without a second list.
+"""
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,10 +20,16 @@ from ..effects import list_effects
 from ..effects.terms import list_terms
 from ..errors import LabsimError
 from ..records import Campaign, Material
-from ..references import find_keys, read_references
 from ..sph.materials import find_law
 from ..text_files import load_json
 from . import _provenance, options
+
+FILE = Path(__file__).parents[1] / "references.bib"
+
+# first author, further authors, year: "Hill (1950)", "Güttler et al. (2009)", "Seizinger, Speith & Kley (2012)"
+_AUTHOR_YEAR = re.compile(
+    r"([^\W\d_a-z][\w'’-]*)(?:(?:,\s[^\W\d_a-z][\w-]+)*\s&\s[\w ]+?|\set\sal\.)?\s\((\d{4}[a-z]?)\)"
+)
 
 SUMMARIES = ("diagnosis.json", "calibration.json", "strength.json", "run.json")
 MEASURED = ("drop.json", "scan.json", "tracks.json", "scans.json")  # rest on labsim alone
@@ -124,3 +137,23 @@ def _find_law(summary: dict[str, Any], campaign: Campaign | None) -> str:
     if isinstance(material, dict) and isinstance(material.get("law"), str):
         return material["law"]
     return campaign.material.law if campaign is not None else Material.law
+
+
+@cache
+def read_references() -> dict[str, str]:
+    """key -> the BibTeX entry as it stands in references.bib."""
+    text = FILE.read_text(encoding="utf-8")
+    entries = re.findall(r"^@\w+\{([\w-]+),$.*?^\}$", text, re.MULTILINE | re.DOTALL)
+    parts = re.findall(r"^@\w+\{[\w-]+,$.*?^\}$", text, re.MULTILINE | re.DOTALL)
+    return dict(zip(entries, parts, strict=True))
+
+
+def find_keys(text: str) -> list[str]:
+    """Keys of all references that a text names by author and year, in its order, whether references.bib has them or not."""
+    return list(dict.fromkeys(_fold(name) + year for name, year in _AUTHOR_YEAR.findall(text)))
+
+
+def _fold(name: str) -> str:
+    """A surname in plain small letters: Güttler -> guttler."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    return plain.lower()

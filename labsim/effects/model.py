@@ -16,7 +16,8 @@
 Of another law than the dust's, ``law = "von_mises"`` and what is calibrated of it (``cohesion_Pa``) stand under [material].
 
 Under [law] stand coefficients of terms (effects/terms/), and tables at knots: ``strength_of_filling_factor`` (filling factor,
-strength over what p_m gives minus one), ``force_of_depth`` (tip radii, Pa), ``force_of_speed`` (m/s, Pa).
+strength over what p_m gives minus one), ``force_of_depth`` (tip radii, Pa), ``force_of_speed`` (m/s, Pa), ``mass_of_depth``
+(tip radii, kg/m³).
 
 ``labsim diagnose`` writes it, ``labsim simulate --model`` and ``labsim calibrate --model`` take it, people may write it.
 """
@@ -133,6 +134,12 @@ def _read_law(path: Path, table: Mapping[str, Any]) -> Law:
                     path,
                     "law.force_of_speed",
                     f"{value:g} Pa at {knot:g} m/s pushes along the motion; write 0 or more",
+                )
+            if place == "mass of depth" and value < 0:
+                raise EffectError(
+                    path,
+                    "law.mass_of_depth",
+                    f"{value:g} kg/m³ at {knot:g} tip radii takes mass away; write 0 or more",
                 )
             if place == "strength of filling factor" and value < LEAST - 1:
                 raise EffectError(

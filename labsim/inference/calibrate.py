@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from scipy.stats import truncnorm
 from ..calibrated import show_parameter
 from ..effects import list_effects
 from ..effects.model import Model
-from ..errors import InferenceError
+from ..errors import ExtrapolationError, InferenceError
 from ..own_keys import DUST
 from ..records import Campaign
 from ..runs.store import Progress, RunStore
@@ -38,7 +39,7 @@ AT = 0.1  # the same, that nobody would tell from none
 LOST = 1e-6  # p value of a nominal fit that is not believed
 STATIC = "static_strength"  # nobody knows beforehand that dust at rest is as strong as in a drop
 FIRST_START = 1414.0  # Pa, or what the range has nearest to it: laboratories report some kPa
-OTHER_STARTS = (500.0, 3500.0)  # Pa
+RUNG = 0.7  # of ln p_m, between two of the strengths that a lost fit is looked for at
 
 
 @dataclass(frozen=True)
@@ -97,16 +98,29 @@ def prepare(
     dust = campaign.material.law == DUST
     start = max(min(middle, math.log(FIRST_START)), math.log(campaign.p_m_range[0])) if dust else middle
     nominal = fit_hypothesis(bench, (), (start, {}))
-    if (
-        dust and goodness_of_fit(nominal) < LOST
-    ):  # a law so wrong that Gauss-Newton may have run away: from other strengths too
-        starts = [math.log(p) for p in OTHER_STARTS if campaign.p_m_range[0] <= p <= campaign.p_m_range[1]]
-        fits = [nominal, *(fit_hypothesis(bench, (), (start, {})) for start in starts)]
-        nominal = max(fits, key=lambda fit: fit.evidence)
+    if dust and goodness_of_fit(nominal) < LOST:
+        nominal = fit_from_afar(bench, nominal)
     if bench.numerics:
         bench.require_fingerprints(list(bench.numerics), nominal.log_p_m, "what the solver's settings change")
         nominal = fit_hypothesis(bench, (), (nominal.log_p_m, {}), nuisances=nominal)
     return bench, nominal
+
+
+def fit_from_afar(bench: Workbench, nominal: Fit) -> Fit:
+    """The better of ``nominal`` and of a fit from where, on a ladder over the range of p_m, the data are least improbable.
+
+    A law may be so wrong that Gauss and Newton run away, or stay: a drop that is simulated to stop before the measured one has
+    no force at all where the data have the largest, and its slope there says nothing.
+    """
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    ladder = np.linspace(low, high, 1 + math.ceil((high - low) / RUNG))
+    seen = [nominal]
+    for start in ladder:
+        with suppress(ExtrapolationError):  # its runs fail: not from there
+            seen.append(fit_hypothesis(bench, (), (float(start), {}), iterations=0))
+    best = max(seen, key=lambda fit: fit.evidence)
+    again = fit_hypothesis(bench, (), (best.log_p_m, {}), nuisances=best)
+    return max((best, again), key=lambda fit: fit.evidence)
 
 
 def calibrate(

@@ -6,18 +6,20 @@ is there, what cannot be read, what looks odd and what is missing; the questions
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ..ct.reduce import reduce_scan
 from ..errors import LabsimError
-from ..records import Campaign
+from ..records import Campaign, Scan
 from .drops import inspect_drop
-from .found import Found
-from .missing import list_missing
+from .found import ODD, Found
 from .resistance import judge_resistance
 from .scales import judge_scales
-from .scans import inspect_scan
 from .strength import inspect_strength_test
+
+GREY_SHARE = 0.005  # relative, of a filling factor whose grey calibration has no stated error
 
 Progress = Callable[[float, float, str], None]
 
@@ -61,3 +63,56 @@ def inspect_campaign(campaign: Campaign, progress: Progress) -> Inspection:
     judge_resistance(campaign, drops)
     tests = [inspect_strength_test(test, campaign) for test in campaign.strength_tests]
     return Inspection(drops, scans, tests, judge_scales(drops), list_missing(campaign))
+
+
+def inspect_scan(scan: Scan, campaign: Campaign) -> Found:
+    stated = campaign.sample
+    try:
+        reduced = reduce_scan(scan, sample_filling_factor=stated.filling_factor)
+    except LabsimError as trouble:
+        return Found(scan.name, "no map can be made", trouble=trouble)
+    phi = reduced.undisturbed
+    found = Found(
+        scan.name,
+        f"{2e3 * scan.projectile.tip_radius:.3g} mm bead, tip {reduced.map.tip_depth * 1e3:.3f} mm deep, undisturbed dust of "
+        f"filling factor {phi.value:.5f} ± {phi.sigma:.5f}",
+        {"filling_factor_undisturbed": phi.value, "tip_depth_m": reduced.map.tip_depth},
+        list(reduced.map.warnings),
+    )
+    sigma = math.hypot(phi.sigma, stated.filling_factor_sigma, GREY_SHARE * stated.filling_factor)
+    if abs(phi.value - stated.filling_factor) > ODD * sigma:
+        found.odd.append(
+            f"the undisturbed dust has filling factor {phi.value:.4f}, but campaign.toml states {stated.filling_factor:g} ± "
+            f"{stated.filling_factor_sigma:g}; check the grey calibration or sample.filling_factor"
+        )
+    return found
+
+
+def list_missing(campaign: Campaign) -> list[str]:
+    """One line for each thing that is missing."""
+    lines = []
+    tracked = [drop for drop in campaign.drops if drop.record.kind != "summary"]
+    dropped = [drop for drop in tracked if drop.gauge is None]
+    if dropped and not campaign.scans:
+        lines.append(
+            "no CT scan: nothing is seen of the dust itself; scale of the CT, crust and gradient cannot be told"
+        )
+    if dropped and len({round(drop.projectile.tip_radius, 7) for drop in tracked}) == 1:
+        lines.append("one tip radius only: causes that depend on size look like others")
+    heights = [drop.height.value for drop in tracked if drop.height is not None]
+    if heights and max(heights) < 4 * min(heights):
+        lines.append("speeds within a factor of two: causes that depend on speed look like others")
+    if 0 < len(tracked) < 4:
+        lines.append(
+            f"{len(tracked)} tracked drop{'s' * (len(tracked) > 1)}: p_m can be found, the scatter of samples and causes hardly"
+        )
+    blank = [drop.name for drop in dropped if drop.projectile.mass_sigma == 0]
+    if blank:
+        lines.append(f"mass_sigma_mg is 0 or not given in {shorten(blank)}: the mass is taken as exact")
+    if campaign.sample.filling_factor_sigma == 0:
+        lines.append("sample.filling_factor_sigma is 0: the filling factor is taken as exact")
+    return lines
+
+
+def shorten(names: Sequence[str], most: int = 6) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

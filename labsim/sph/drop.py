@@ -15,10 +15,10 @@ import numpy as np
 from ..errors import SimulationError
 from ..records import FloatArray
 from . import particles as rows
-from .lines import ROOM, WIDTH, make_lines, make_rows
+from .kernels.lines import ROOM, WIDTH, make_lines, make_rows
+from .kernels.neighbours import Neighbours
 from .loop import load_loop
 from .materials import find_law
-from .neighbours import Neighbours
 from .particles import name_rows, place_particles
 from .profile import measure_distance
 from .run import DropRun, make_run
@@ -92,6 +92,7 @@ def evolve(
         setting.side_friction * force_scale,
         *_split(setting.force_of_depth, force_scale),
         *_split(setting.force_of_speed, force_scale),
+        *_split(setting.mass_of_depth, force_scale),
         *path,
     )
     log = np.zeros((4096, len(LOG)))

@@ -17,8 +17,8 @@ from ._jit import SOLVER_HASH, loop_folder
 from .materials import find_law, hash_law
 from .plugins import load_module
 
-TEMPLATE = Path(__file__).with_name("advance.py")
-LAW_IMPORT = re.compile(r"^from \.materials\.porous_dust import update\b.*$", re.MULTILINE)
+TEMPLATE = Path(__file__).with_name("kernels") / "advance.py"
+LAW_IMPORT = re.compile(r"^from \.\.materials\.porous_dust import update\b.*$", re.MULTILINE)
 
 
 def load_loop(law: str) -> Callable[..., int]:
@@ -34,7 +34,10 @@ def _load_loop(law: str, source_hash: str) -> Callable[..., int]:
         f"from {module.__name__} import update", TEMPLATE.read_text(encoding="utf-8")
     )
     assert found == 1
-    source = re.sub(r"^from \.(\w+) import", rf"from {__package__}.\1 import", source, flags=re.MULTILINE)
+    for dots, package in ((r"\.\.", __package__), (r"\.", f"{__package__}.kernels")):
+        source = re.sub(
+            rf"^from {dots}(\w+) import", rf"from {package}.\1 import", source, flags=re.MULTILINE
+        )
     return load_module(_write_once(source, name), name).advance
 
 

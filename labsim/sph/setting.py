@@ -73,6 +73,9 @@ class DropSetting:
     force_of_speed: tuple[
         tuple[float, float], ...
     ] = ()  # (speed m/s, force N against the motion), linear between
+    mass_of_depth: tuple[
+        tuple[float, float], ...
+    ] = ()  # (depth m, kg of dust that move with the tip), linear between
 
     def replace(self, **changes: object) -> DropSetting:
         return replace(self, **changes)  # type: ignore[arg-type]

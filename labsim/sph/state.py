@@ -87,14 +87,16 @@ class Numbers(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """What acts on the projectile besides the dust in the simulation: forces of the immersed length, of depth, of speed; and a
-    driver, where there is a path."""
+    """What acts on the projectile besides the dust in the simulation: forces of the immersed length, of depth, of speed; dust
+    that sticks to it; and a driver, where there is a path."""
 
     side_friction: float  # N/m
     depth_knots: FloatArray
     depth_force: FloatArray
     speed_knots: FloatArray
     speed_force: FloatArray
+    mass_knots: FloatArray  # m
+    stuck: FloatArray  # kg
     path_time: FloatArray
     path_depth: FloatArray
 

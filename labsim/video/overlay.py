@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import cv2
@@ -21,15 +21,22 @@ def write_overlay(
 ) -> Path:
     """Write the frames with tip and surface as an MP4 (slow motion, 15 pictures a second). Raises MeasurementError."""
     every = max(1, len(track.frame) // LONGEST_MOVIE)
-    zoom = _zoom(frames.shape)
-    size = (frames.shape[1] * zoom // 2 * 2, frames.shape[0] * zoom // 2 * 2)
-    movie = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 15.0, size)
-    if not movie.isOpened():
-        raise MeasurementError(path, "overlay", "cannot be written: OpenCV has no MP4 encoder here")
-    for i, picture in _draw(frames, track, column, surface_row, zoom):
-        if i % every == 0:
-            movie.write(np.ascontiguousarray(picture[: size[1], : size[0]]))
-    movie.release()
+    drawn = _draw(frames, track, column, surface_row, _zoom(frames.shape))
+    return write_movie((picture[..., ::-1] for i, picture in drawn if i % every == 0), path, 15.0)
+
+
+def write_movie(pictures: Iterable[np.ndarray], path: Path, rate: float = 20.0) -> Path:
+    """Write RGB pictures, (rows, columns, 3) uint8 and all of one size, as an MP4. Raises MeasurementError."""
+    movie = None
+    for picture in pictures:
+        rows, columns = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2  # the codec wants even sizes
+        if movie is None:
+            movie = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate, (columns, rows))
+            if not movie.isOpened():
+                raise MeasurementError(path, "movie", "cannot be written: OpenCV has no MP4 encoder here")
+        movie.write(np.ascontiguousarray(picture[:rows, :columns, ::-1]))
+    if movie is not None:
+        movie.release()
     return path
 
 

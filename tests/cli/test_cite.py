@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 
 import labsim
 from labsim.cli import app
+from labsim.cli.cite import find_keys, read_references
 from labsim.effects import list_effects
 from labsim.effects.terms import list_terms
 from labsim.errors import LabsimError
-from labsim.references import find_keys, read_references
 from labsim.sph.materials import find_law, list_laws
 
 DATA = Path(__file__).parents[2] / "data"

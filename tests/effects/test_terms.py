@@ -35,7 +35,7 @@ def test_every_term_is_what_its_page_says(name):
     low, high = term.limits
     assert low <= 0.0 <= high
     assert add_term(SETTING, term, 0.0) is SETTING
-    if term.place == "force of speed":
+    if term.place in ("force of speed", "mass of depth"):
         assert np.all(min(max(c, -1e9), 1e9) * values.min() >= 0 for c in (low, high))
     if term.place == "strength of filling factor":
         hardest = add_term(SETTING, term, max(low, -100.0)).strength_shape
@@ -65,6 +65,14 @@ def test_forces_add_up_and_factors_multiply():
     np.testing.assert_allclose(np.interp(0.25, phi, factor), 1.2 * (1 + 0.1 * 10 * 0.1), rtol=1e-9)
 
 
+def test_mass_goes_with_section_and_radius_and_grows_no_less():
+    depth, mass = np.array(add_term(SETTING, TERMS["stuck_mass"], 300.0).mass_of_depth).T
+    np.testing.assert_allclose(mass, 300.0 * AREA * depth, rtol=1e-12)
+    cap = np.array(add_term(SETTING, TERMS["stuck_cap"], 300.0).mass_of_depth)
+    assert cap[-1, 1] == pytest.approx(300.0 * AREA * 5e-4)
+    assert np.all(np.diff(cap[:, 1]) >= 0)
+
+
 def test_a_law_survives_its_file_and_reaches_the_drop(tmp_path):
     law = Law((("inertial_drag", 120.5),), (("force of depth", ((0.0, 0.0), (1.0, 80.0), (2.0, -3.25))),))
     model = Model(1012.0, (), (), law)
@@ -83,6 +91,7 @@ def test_a_law_survives_its_file_and_reaches_the_drop(tmp_path):
         ("force_of_speed = [[0.0, 1.0], [1.0, -1.0]]", "pushes along the motion"),
         ("force_of_depth = [[1.0, 1.0], [0.0, 1.0]]", "do not grow"),
         ("force_of_depth = 3", "is no table"),
+        ("mass_of_depth = [[0.0, 0.0], [1.0, -3.0]]", "takes mass away"),
         ("strength_of_filling_factor = [[0.15, 0.0], [0.3, -1.0]]", "leaves no strength"),
     ],
 )

@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -291,6 +292,23 @@ def test_terms_of_the_catalogue_make_it_shallower(term, drop):
     assert run.penetration_depth < drop.penetration_depth * 0.998
     assert abs(run.momentum_error) < 1e-12
     assert abs(run.energy_error) < 0.015
+
+
+def test_dust_that_sticks_is_as_good_as_a_heavier_projectile(drop):
+    """The same mass from the start on; and mass that grows on the way takes it deeper, with its book closed."""
+    setting = a_drop()
+    mass = setting.projectile.mass
+    heavier = simulate(a_drop(projectile=replace(setting.projectile, mass=1.5 * mass)))
+    size = {"width": setting.extent[0], "depth": heavier.setting.extent[1]}
+    heavier = simulate(a_drop(projectile=replace(setting.projectile, mass=1.5 * mass), **size))
+    from_the_start = simulate(a_drop(mass_of_depth=((0.0, 0.5 * mass), (1.0, 0.5 * mass)), **size))
+    assert from_the_start.penetration_depth == pytest.approx(heavier.penetration_depth, rel=2e-4)
+    grown = simulate(a_drop(mass_of_depth=((0.0, 0.0), (1e-2, 5.0 * mass))))
+    assert drop.penetration_depth * 1.01 < grown.penetration_depth < 2.0 * drop.penetration_depth
+    assert abs(grown.momentum_error) < 1e-12 and abs(grown.energy_error) < 0.015
+    assert (
+        simulate(a_drop(mass_of_depth=((0.0, 0.0), (1.0, 0.0)))).penetration_depth == drop.penetration_depth
+    )
 
 
 def test_trapped_gas_is_in_the_energy_book(drop):

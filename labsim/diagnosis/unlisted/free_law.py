@@ -1,10 +1,11 @@
 """A free law where the equations have a place for it: in the strength of the dust and in the force on the projectile.
 
-    m d²z/dt² = m g - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
+    (m + A a Σ_m d_m h_m(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
 
 h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. What every hat changes of drops
 and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian
-about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/free-law.md.
+about nought with one size, ln p_m is flat. Their integral over the linearised data is closed:
+docs/free-law.md. Mass d may not shrink, which such coefficients do not know: its hats serve formulas (learned_law.py) alone.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from ...records import Campaign
 from ...sph import DropSetting
 
 PRESSURE = 400.0  # Pa, what stops a drop of 0.65 m/s by the published 625 Pa s/m: the unit of the forces
+MASS = 1000.0  # kg/m³, a third of a glass bead in every radius of its way: the unit of mass that sticks to the tip
 STEP = 0.3  # of a hat when it is simulated
 FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
 COMPACTION = (
@@ -32,6 +33,11 @@ COMPACTION = (
     0.13,
 )  # above φ0: half of what a tip compacts ends below 0.03, nine tenths below 0.07
 DEPTHS = (0.0, 0.5, 1.0, 2.0, 4.0)  # tip radii
+MASS_DEPTHS = (
+    0.0,
+    1.0,
+    4.0,
+)  # enough for the terms; a mass that goes up and down again would be any force of depth
 SPEEDS = (0.1, 0.3, 0.6, 1.2)  # m/s; nought at rest: a force that does not change with speed is one of depth
 
 
@@ -58,7 +64,7 @@ class FreeLaw:
 
 
 def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
-    """The three laws with the hats that these drops and scans reach."""
+    """The four laws with the hats that these drops and scans reach."""
     deepest, fastest = 0.0, 0.0
     for observation, nuisances in zip(bench.observations, fit.nuisances, strict=True):
         if isinstance(observation, Tracks):
@@ -80,6 +86,10 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
         ),
         FreeLaw(
             "force of speed", "speed", "m/s", at_rest, _reached(at_rest, fastest)[1:], (0.0, fastest), "Pa", PRESSURE
+        ),
+        FreeLaw(
+            "mass of depth", "depth", "tip radii", MASS_DEPTHS, _reached(MASS_DEPTHS, deepest)[1:], (0.0, deepest),
+            "kg/m³", MASS,
         ),
     )  # fmt: skip
 

@@ -1,10 +1,10 @@
 """Terms: what one-parameter formulas may add to the equations of motion, one file a family, found by listing this folder.
 
-    m d²z/dt² = m g - F_dust[Σ(φ) (1 + Σ c s(φ - φ0))] - A Σ c s(z/a) - A Σ c s(v)
+    (m + A a Σ c s(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ c s(φ - φ0))] - A Σ c s(z/a) - A Σ c s(v)
 
-A is the cross-section of the tip, a its radius: a force is a pressure, so that one law holds for all sizes. A file has ``TERMS``.
-A law is some terms with their coefficients, or tables at knots; ``labsim diagnose`` learns one where no listed cause explains the
-data, a model.toml holds it.
+A is the cross-section of the tip, a its radius: a force is a pressure, a mass a density, so that one law holds for all sizes. A
+file has ``TERMS``. A law is some terms with their coefficients, or tables at knots; ``labsim diagnose`` learns one where no
+listed cause explains the data, a model.toml holds it.
 """
 
 from __future__ import annotations
@@ -26,9 +26,19 @@ PLACES = {
     "strength of filling factor": ("1", "1", "strength over what p_m gives, minus one"),
     "force of depth": ("tip radii", "Pa", "upward force over the cross-section of the tip"),
     "force of speed": ("m/s", "Pa", "force against the motion over the cross-section of the tip"),
+    "mass of depth": (
+        "tip radii",
+        "kg/m³",
+        "mass that moves with the tip over its cross-section and its radius",
+    ),
 }
 # what of it a drop passes: φ - φ0, nine tenths of what is compacted; tip radii; m/s
-REACH = {"strength of filling factor": 0.15, "force of depth": 12.0, "force of speed": 2.0}
+REACH = {
+    "strength of filling factor": 0.15,
+    "force of depth": 12.0,
+    "force of speed": 2.0,
+    "mass of depth": 12.0,
+}
 FASTEST = 1.3  # of the impact speed, that a force of speed is tabulated to
 LEAST = 0.1  # of the strength that p_m gives, which a law must leave
 KNOTS = 97
@@ -52,8 +62,9 @@ class Term:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Of c: no force along the motion, for that gains energy on a closed way, and no strength below LEAST of what p_m gives
-        as far as drops compact (REACH). A force of depth does no work on a closed way and may have either sign."""
+        """Of c: no force along the motion, for that gains energy on a closed way, no mass below nought, and no strength below
+        LEAST of what p_m gives as far as drops compact (REACH). A force of depth does no work on a closed way and may have
+        either sign."""
         values = self.shape(np.linspace(0.0, REACH[self.place], KNOTS))
         if self.place == "force of depth":
             return -math.inf, math.inf
@@ -98,6 +109,7 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
         "strength of filling factor": setting.material.phi_2 - setting.filling_factor,
         "force of depth": REACH["force of depth"],
         "force of speed": FASTEST * setting.impact_speed,
+        "mass of depth": REACH["mass of depth"],
     }[term.place]
     place = np.linspace(0.0, reach, KNOTS)
     value = coefficient * term.shape(place)
@@ -108,7 +120,7 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
 
 def add_table(setting: DropSetting, place: str, table: Knots) -> DropSetting:
     """The drop with a law at knots, linear between and constant beyond, beside those that it has: forces add up, factors on the
-    strength multiply. table : filling factor and factor, tip radii and Pa, or m/s and Pa."""
+    strength multiply. table : filling factor and factor, tip radii and Pa, m/s and Pa, or tip radii and kg/m³."""
     if place == "strength of filling factor":
         return setting.replace(strength_shape=combine(setting.strength_shape, table, product=True))
     radius = setting.projectile.tip_radius
@@ -116,6 +128,9 @@ def add_table(setting: DropSetting, place: str, table: Knots) -> DropSetting:
     if place == "force of depth":
         table = tuple((knot * radius, value * area) for knot, value in table)
         return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+    if place == "mass of depth":
+        table = tuple((knot * radius, value * area * radius) for knot, value in table)
+        return setting.replace(mass_of_depth=combine(setting.mass_of_depth, table))
     table = tuple((knot, value * area) for knot, value in table)
     return setting.replace(force_of_speed=combine(setting.force_of_speed, table))
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ...records import FloatArray
 from ...sph import DropRun, particles
 from ...sph.drop import evolve, start_body
-from ...video.movie import write_movie
+from ...video.overlay import write_movie
 from .look import STYLE
 from .runs import fill_density_field
 

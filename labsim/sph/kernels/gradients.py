@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ._jit import compiled
+from .._jit import compiled
 
 SMALLEST_EIGENVALUE = 0.3  # of the moment matrix, below which it is lifted: a lone particle has no gradient
 

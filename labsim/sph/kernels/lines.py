@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..records import FloatArray
+from ...records import FloatArray
 
 WIDTH = 8  # numbers a line, and particles a transposition
 ROOM = 64  # neighbours a buffer holds of each number

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import math
 
-from ._jit import compiled
-from .profile import find_surface
+from .._jit import compiled
+from ..profile import find_surface
 
 UPRIGHT = 1.0e-9  # of the normal along z: less is a shaft
 STICK = 0.5  # the largest share of its slip that friction takes from a particle in a step: more would turn the slip round

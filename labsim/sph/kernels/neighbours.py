@@ -8,16 +8,29 @@ nothing to a gradient.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import compiled_entry
+from .._jit import compiled_entry
 from .lines import WIDTH
 
 
+class Cells(NamedTuple):
+    """nx × nz cells from x0, z0 on, m."""
+
+    x0: float
+    z0: float
+    size_x: float
+    size_z: float
+    nx: int
+    nz: int
+
+
 @compiled_entry
-def sort_into_cells(n, x, z, x0, z0, size_x, size_z, nx, nz, cell_start, order, cell_of):
-    """Counting sort of n points into nx × nz cells; ``order`` lists points cell by cell."""
+def sort_into_cells(n, x, z, cells, cell_start, order, cell_of):
+    """Counting sort of n points into cells; ``order`` lists points cell by cell."""
+    x0, z0, size_x, size_z, nx, nz = cells
     for c in range(nx * nz + 1):
         cell_start[c] = 0
     for i in range(n):
@@ -35,9 +48,10 @@ def sort_into_cells(n, x, z, x0, z0, size_x, size_z, nx, nz, cell_start, order, 
 
 
 @compiled_entry
-def list_neighbours(n, x, z, xs, zs, reach, x0, z0, size_x, size_z, nx, nz, cell_start, line, start, out):
+def list_neighbours(n, x, z, xs, zs, reach, cells, cell_start, line, start, out):
     """Neighbours within ``reach`` of particles 0..n-1 among all sorted points: xs, zs and where their lines begin. Returns the
     length used, or -1 where ``out`` may be too short. Every candidate is written and kept by moving on: no branch to guess."""
+    x0, z0, size_x, size_z, nx, nz = cells
     reach2 = reach * reach
     used = 0
     span = math.ceil(reach / size_z)
@@ -115,16 +129,16 @@ class Neighbours:
         reach = self.reach + self.skin
         x0, z0 = x[:m].min(), z[:m].min()
         width, height = x[:m].max() - x0, z[:m].max() - z0
-        size = (reach / 4, reach / 2)
-        cells = int(width / size[0]) + 1, int(height / size[1]) + 1
-        cell_start = np.zeros(cells[0] * cells[1] + 1, dtype=np.int64)
+        size_x, size_z = reach / 4, reach / 2
+        cells = Cells(x0, z0, size_x, size_z, int(width / size_x) + 1, int(height / size_z) + 1)
+        cell_start = np.zeros(cells.nx * cells.nz + 1, dtype=np.int64)
         order = np.empty(m, dtype=np.uint32)
-        sort_into_cells(m, x, z, x0, z0, *size, *cells, cell_start, order, np.empty(m, dtype=np.int64))
+        sort_into_cells(m, x, z, cells, cell_start, order, np.empty(m, dtype=np.int64))
         if self.start.size != n + 1:
             self.start = np.empty(n + 1, dtype=np.int64)
         xs, zs, line = x[order], z[order], WIDTH * order
         while list_neighbours(
-            n, x, z, xs, zs, reach, x0, z0, *size, *cells, cell_start, line, self.start, self.list
+            n, x, z, xs, zs, reach, cells, cell_start, line, self.start, self.list
         ) < 0:  # fmt: skip
             self.list = np.empty(int(self.list.size * 1.3) + 40 * n, dtype=np.uint32)
         self.then = x[:m].copy(), z[:m].copy()

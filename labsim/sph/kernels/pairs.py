@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ._jit import compiled
+from .._jit import compiled
 from .lines import ROOM, read_eight, read_five
 
 GRADIENT_NORM = -35.0 / (4.0 * math.pi)

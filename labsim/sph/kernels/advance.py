@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from ._jit import compiled_loop
+from .._jit import compiled_loop
+from ..materials.porous_dust import update  # another law: `load_loop` puts its name here
+from ..state import FRICTION, LAST_STEP, SPEED, TIME, TIP
 from .gradients import (
     bound_step,
     carry_stress,
@@ -17,7 +19,6 @@ from .gradients import (
     renormalise,
 )
 from .lines import WIDTH, write_lines
-from .materials.porous_dust import update  # another law: `load_loop` puts its name here
 from .pairs import sum_forces, sum_gradients
 from .projectile import (
     bound_contact,
@@ -27,7 +28,6 @@ from .projectile import (
     press,
     strain_against_wall,
 )
-from .state import FRICTION, LAST_STEP, SPEED, TIME, TIP
 
 EIGHT = np.uint64(WIDTH)
 BLOCK = np.uint64(
@@ -151,6 +151,11 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
                 * speed
                 / (abs(speed) + 1.0e-3)
             )
+        if outside.mass_knots.size > 0 and not led:
+            # dust that sticks to it has its speed when it does: one more body, whose push on the projectile is this
+            stuck = interpolate(depth, outside.mass_knots, outside.stuck)
+            share = numbers.body_mass / max(numbers.body_mass + stuck, 0.1 * numbers.body_mass)
+            pushed = share * (force + pushed) - force
         held = 0.0
         for i in lists.fixed:  # keeps its velocity, nought in a drop
             held -= s.fz[i]
