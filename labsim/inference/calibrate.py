@@ -39,7 +39,8 @@ AT = 0.1  # the same, that nobody would tell from none
 LOST = 1e-6  # p value of a nominal fit that is not believed
 STATIC = "static_strength"  # nobody knows beforehand that dust at rest is as strong as in a drop
 FIRST_START = 1414.0  # Pa, or what the range has nearest to it: laboratories report some kPa
-RUNG = 0.7  # of ln p_m, between two of the strengths that a lost fit is looked for at
+OTHER_STARTS = (500.0, 3500.0)  # Pa, of a fit to films that is lost
+RUNG = 0.7  # of ln p_m, between two of the strengths that a lost fit to accelerometers is looked for at
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def prepare(
     dust = campaign.material.law == DUST
     start = max(min(middle, math.log(FIRST_START)), math.log(campaign.p_m_range[0])) if dust else middle
     nominal = fit_hypothesis(bench, (), (start, {}))
-    if dust and goodness_of_fit(nominal) < LOST:
+    if dust and goodness_of_fit(nominal) < LOST:  # Gauss and Newton may have run away
         nominal = fit_from_afar(bench, nominal)
     if bench.numerics:
         bench.require_fingerprints(list(bench.numerics), nominal.log_p_m, "what the solver's settings change")
@@ -107,12 +108,16 @@ def prepare(
 
 
 def fit_from_afar(bench: Workbench, nominal: Fit) -> Fit:
-    """The better of ``nominal`` and of a fit from where, on a ladder over the range of p_m, the data are least improbable.
+    """The better of ``nominal`` and of fits from other strengths.
 
-    A law may be so wrong that Gauss and Newton run away, or stay: a drop that is simulated to stop before the measured one has
-    no force at all where the data have the largest, and its slope there says nothing.
+    Of accelerometers from where, on a ladder over the range of p_m, the data are least improbable: a drop that is simulated to
+    stop before the measured one has no force at all where the data have the largest, and its slope there says nothing.
     """
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    if not bench.felt:
+        starts = [math.log(p) for p in OTHER_STARTS if low <= math.log(p) <= high]
+        fits = [nominal, *(fit_hypothesis(bench, (), (start, {})) for start in starts)]
+        return max(fits, key=lambda fit: fit.evidence)
     ladder = np.linspace(low, high, 1 + math.ceil((high - low) / RUNG))
     seen = [nominal]
     for start in ladder:

@@ -11,7 +11,7 @@ from labsim.errors import ExtrapolationError
 from labsim.inference import calibrate
 
 RANGE = (300.0, 6000.0)
-BENCH = SimpleNamespace(campaign=SimpleNamespace(p_m_range=RANGE))
+BENCH = SimpleNamespace(felt=True, campaign=SimpleNamespace(p_m_range=RANGE))
 
 
 def make_fit(log_p_m: float, evidence: float) -> SimpleNamespace:
