@@ -7,7 +7,15 @@ import pytest
 
 from labsim.diagnosis.unlisted.free_law import Tangents, gather
 from labsim.diagnosis.unlisted.hats import DEPTHS, PRESSURE, SPEEDS, STEP, FreeLaw
-from labsim.diagnosis.unlisted.learned_law import USUAL, find_peak, make_effect, share_hats, weigh_formulas
+from labsim.diagnosis.unlisted.learned_law import (
+    MOST_SIMULATED,
+    USUAL,
+    choose_formulas,
+    find_peak,
+    make_effect,
+    share_hats,
+    weigh_formulas,
+)
 from labsim.effects.terms import add_term, list_terms
 from labsim.inference.fits.blocks import Block
 from labsim.records import Material, Projectile
@@ -61,6 +69,15 @@ def test_a_force_along_the_motion_is_never_proposed():
             assert c >= 0 or TERMS[name].place == "force of depth"
     names, marginal = weigh_formulas(made_up({"depth_spring": -0.5}), TERMS, PEAKS, LIMITS)[0]
     assert names == ("depth_spring",) and marginal.coefficients[1] < 0
+
+
+def test_every_place_has_its_best_term_simulated():
+    """However far behind it stands: what is weighed is linear about a p_m that may be far off."""
+    ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "viscous_drag": 0.2}), TERMS, PEAKS, LIMITS)
+    chosen = choose_formulas(ranked, TERMS)
+    assert chosen[:MOST_SIMULATED] == ranked[:MOST_SIMULATED]
+    assert {TERMS[names[0]].place for names, _ in chosen if len(names) == 1} == {law.name for law in LAWS}
+    assert len({names for names, _ in chosen}) == len(chosen) <= MOST_SIMULATED + len(LAWS)
 
 
 def test_where_nothing_is_hidden_no_pair_stands_out():

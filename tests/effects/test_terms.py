@@ -65,11 +65,11 @@ def test_forces_add_up_and_factors_multiply():
     np.testing.assert_allclose(np.interp(0.25, phi, factor), 1.2 * (1 + 0.1 * 10 * 0.1), rtol=1e-9)
 
 
-def test_mass_goes_with_section_and_radius_and_grows_no_less():
-    depth, mass = np.array(add_term(SETTING, TERMS["stuck_mass"], 300.0).mass_of_depth).T
-    np.testing.assert_allclose(mass, 300.0 * AREA * depth, rtol=1e-12)
-    cap = np.array(add_term(SETTING, TERMS["stuck_cap"], 300.0).mass_of_depth)
-    assert cap[-1, 1] == pytest.approx(300.0 * AREA * 5e-4)
+def test_mass_is_a_share_of_the_projectile_s_and_grows_no_less():
+    depth, mass = np.array(add_term(SETTING, TERMS["stuck_mass"], 0.3).mass_of_depth).T
+    np.testing.assert_allclose(mass, 0.3 * SETTING.projectile.mass * depth / 5e-4, rtol=1e-12)
+    cap = np.array(add_term(SETTING, TERMS["stuck_cap"], 0.3).mass_of_depth)
+    assert cap[-1, 1] == pytest.approx(0.3 * SETTING.projectile.mass)
     assert np.all(np.diff(cap[:, 1]) >= 0)
 
 

@@ -1,6 +1,6 @@
 """A free law where the equations have a place for it: in the strength of the dust and in the force on the projectile.
 
-    (m + A a Σ_m d_m h_m(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
+    m (1 + Σ_m d_m h_m(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
 
 h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. What every hat changes of drops
 and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian

@@ -23,7 +23,7 @@ from ...records import Campaign
 from ...sph import DropSetting
 
 PRESSURE = 400.0  # Pa, what stops a drop of 0.65 m/s by the published 625 Pa s/m: the unit of the forces
-MASS = 1000.0  # kg/m³, a third of a glass bead in every radius of its way: the unit of mass that sticks to the tip
+MASS = 0.3  # of the projectile's mass, that sticks to it: the unit
 STEP = 0.3  # of a hat when it is simulated
 FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
 COMPACTION = (
@@ -89,7 +89,7 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
         ),
         FreeLaw(
             "mass of depth", "depth", "tip radii", MASS_DEPTHS, _reached(MASS_DEPTHS, deepest)[1:], (0.0, deepest),
-            "kg/m³", MASS,
+            "1", MASS,
         ),
     )  # fmt: skip
 

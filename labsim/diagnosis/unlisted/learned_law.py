@@ -20,6 +20,7 @@ from ...effects import Effect, Normal, Parameter
 from ...effects.terms import KNOTS, Term, add_term, list_terms
 from ...errors import LabsimError
 from ...inference.fits.fitting import Fit, fit_hypothesis
+from ...inference.fits.settle import list_large, settle
 from ...inference.workbench import Workbench
 from ...records import Campaign, FloatArray
 from ...sph import DropSetting
@@ -30,7 +31,7 @@ from .hats import STEP, FreeLaw
 from .unknown import log_mean
 
 USUAL = 0.4  # of a law's unit: standard deviation of a coefficient's prior where its term is largest, the middle of SIZES
-MOST_SIMULATED = 4  # formulas
+MOST_SIMULATED = 2  # formulas, beside the best of every place
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
 
@@ -84,7 +85,7 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     free = replace(bench, effects={**bench.effects, **effects})
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     formulas = []
-    for names, marginal in weigh_formulas(tangents, terms, peaks, (low, high))[:MOST_SIMULATED]:
+    for names, marginal in choose_formulas(weigh_formulas(tangents, terms, peaks, (low, high)), terms):
         units = [laws[terms[name].place].scale / peaks[name] for name in names]
         values = {
             name: float(c) * unit
@@ -93,6 +94,8 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
         start = tangents.log_p_m + float(marginal.coefficients[0])
         try:
             fit = fit_hypothesis(free, names, (start, values), nuisances=nominal)
+            if list_large(free, fit):
+                fit = settle(free, fit)
         except LabsimError:
             continue  # its runs fail: no formula for this dust
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -103,6 +106,20 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     if not formulas:
         return None
     return LearnedLaw(tuple(sorted(formulas, key=lambda each: -each.fit.evidence)), free)
+
+
+def choose_formulas(
+    weighed: Sequence[tuple[tuple[str, ...], Marginal]], terms: Mapping[str, Term]
+) -> list[tuple[tuple[str, ...], Marginal]]:
+    """Those to simulate, best first: the first MOST_SIMULATED, and the best single term of every other place. What is weighed is
+    linear about a p_m that may be far from the truth's, where a term of the right place stands behind pairs of wrong ones."""
+    chosen = list(weighed[:MOST_SIMULATED])
+    places = {terms[names[0]].place for names, _ in chosen if len(names) == 1}
+    for names, marginal in weighed:
+        if len(names) == 1 and terms[names[0]].place not in places:
+            places.add(terms[names[0]].place)
+            chosen.append((names, marginal))
+    return chosen
 
 
 def find_peak(term: Term, law: FreeLaw) -> float:

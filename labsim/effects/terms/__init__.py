@@ -1,9 +1,9 @@
 """Terms: what one-parameter formulas may add to the equations of motion, one file a family, found by listing this folder.
 
-    (m + A a Σ c s(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ c s(φ - φ0))] - A Σ c s(z/a) - A Σ c s(v)
+    m (1 + Σ c s(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ c s(φ - φ0))] - A Σ c s(z/a) - A Σ c s(v)
 
-A is the cross-section of the tip, a its radius: a force is a pressure, a mass a density, so that one law holds for all sizes. A
-file has ``TERMS``. A law is some terms with their coefficients, or tables at knots; ``labsim diagnose`` learns one where no
+A is the cross-section of the tip, a its radius: a force is a pressure, so that one law holds for all sizes. A file
+has ``TERMS``. A law is some terms with their coefficients, or tables at knots; ``labsim diagnose`` learns one where no
 listed cause explains the data, a model.toml holds it.
 """
 
@@ -26,11 +26,7 @@ PLACES = {
     "strength of filling factor": ("1", "1", "strength over what p_m gives, minus one"),
     "force of depth": ("tip radii", "Pa", "upward force over the cross-section of the tip"),
     "force of speed": ("m/s", "Pa", "force against the motion over the cross-section of the tip"),
-    "mass of depth": (
-        "tip radii",
-        "kg/m³",
-        "mass that moves with the tip over its cross-section and its radius",
-    ),
+    "mass of depth": ("tip radii", "1", "dust that moves with the tip over the projectile's mass"),
 }
 # what of it a drop passes: φ - φ0, nine tenths of what is compacted; tip radii; m/s
 REACH = {
@@ -120,7 +116,7 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
 
 def add_table(setting: DropSetting, place: str, table: Knots) -> DropSetting:
     """The drop with a law at knots, linear between and constant beyond, beside those that it has: forces add up, factors on the
-    strength multiply. table : filling factor and factor, tip radii and Pa, m/s and Pa, or tip radii and kg/m³."""
+    strength multiply. table : filling factor and factor, tip radii and Pa, m/s and Pa, or tip radii and share of the mass."""
     if place == "strength of filling factor":
         return setting.replace(strength_shape=combine(setting.strength_shape, table, product=True))
     radius = setting.projectile.tip_radius
@@ -129,7 +125,7 @@ def add_table(setting: DropSetting, place: str, table: Knots) -> DropSetting:
         table = tuple((knot * radius, value * area) for knot, value in table)
         return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
     if place == "mass of depth":
-        table = tuple((knot * radius, value * area * radius) for knot, value in table)
+        table = tuple((knot * radius, value * setting.projectile.mass) for knot, value in table)
         return setting.replace(mass_of_depth=combine(setting.mass_of_depth, table))
     table = tuple((knot, value * area) for knot, value in table)
     return setting.replace(force_of_speed=combine(setting.force_of_speed, table))

@@ -24,13 +24,12 @@ PLACE_WORDS = {
     "strength of filling factor": "a compressive strength that is more than p_m gives by a share of",
     "force of depth": "a force upwards on the tip, over its cross-section, of",
     "force of speed": "a force against the motion, over the tip's cross-section, of",
-    "mass of depth": "a mass that moves with the tip, over its cross-section and radius, of",
+    "mass of depth": "dust that moves with the tip, over the mass of the projectile, of",
 }
 VALUE_LABELS = {
     "strength of filling factor": "more strength (%)",
     "force of depth": "force upwards (Pa)",
     "force of speed": "force against the motion (Pa)",
-    "mass of depth": "mass that moves with the tip (kg/m³)",
 }
 DIRECTIONS = {
     "force of depth": ("upwards", "downwards"),
@@ -87,10 +86,6 @@ def say_law(law: RecoveredLaw) -> str:
     if law.law.over == "filling factor":
         word = "more" if value > 0 else "less"
         return f"{100 * abs(value):.0f} ± {100 * sigma:.0f} % {word} compressive strength {_say_place(law)}"
-    if law.law.name == "mass of depth":
-        word = "more" if value > 0 else "less"
-        size = f"{abs(value):.0f} ± {sigma:.0f} kg/m³ of its cross-section and radius"
-        return f"a mass of {size} {word} that moves with the tip {_say_place(law)}"
     word = DIRECTIONS[law.law.name][value < 0]
     return f"a force on the tip of {abs(value):.0f} ± {sigma:.0f} Pa of its cross-section {word} {_say_place(law)}"
 
