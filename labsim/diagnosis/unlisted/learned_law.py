@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -84,7 +85,7 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     effects = {name: make_effect(term, laws[term.place].scale / peaks[name]) for name, term in terms.items()}
     free = replace(bench, effects={**bench.effects, **effects})
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    formulas = []
+    fits = []
     for names, marginal in choose_formulas(weigh_formulas(tangents, terms, peaks, (low, high)), terms):
         units = [laws[terms[name].place].scale / peaks[name] for name in names]
         values = {
@@ -93,16 +94,20 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
         }
         start = tangents.log_p_m + float(marginal.coefficients[0])
         try:
-            fit = fit_hypothesis(free, names, (start, values), nuisances=nominal)
-            if list_large(free, fit):
-                fit = settle(free, fit)
+            fits.append(fit_hypothesis(free, names, (start, values), nuisances=nominal))
         except LabsimError:
             continue  # its runs fail: no formula for this dust
+    fits.sort(key=lambda fit: -fit.evidence)
+    if fits and list_large(free, fits[0]):
+        with suppress(LabsimError):
+            fits[0] = settle(free, fits[0])
+    formulas = []
+    for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
             held_out = predict_held_out(free, fit)
             gain = measure_gain(before, held_out)
             if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
-                formulas.append(Formula(tuple(terms[name] for name in names), fit, held_out, gain))
+                formulas.append(Formula(tuple(terms[name] for name in fit.hypothesis), fit, held_out, gain))
     if not formulas:
         return None
     return LearnedLaw(tuple(sorted(formulas, key=lambda each: -each.fit.evidence)), free)
