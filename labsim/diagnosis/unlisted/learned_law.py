@@ -33,6 +33,9 @@ from .unknown import log_mean
 
 USUAL = 0.4  # of a law's unit: standard deviation of a coefficient's prior where its term is largest, the middle of SIZES
 MOST_SIMULATED = 2  # formulas, beside the best of every place
+MOST_SETTLED = (
+    2  # formulas: one that is large was left up to 112 in ln evidence below its best, where runs bend
+)
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
 
@@ -98,9 +101,10 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
         except LabsimError:
             continue  # its runs fail: no formula for this dust
     fits.sort(key=lambda fit: -fit.evidence)
-    if fits and list_large(free, fits[0]):
-        with suppress(LabsimError):
-            fits[0] = settle(free, fits[0])
+    for k, fit in enumerate(fits[:MOST_SETTLED]):
+        if list_large(free, fit):
+            with suppress(LabsimError):
+                fits[k] = settle(free, fit)
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
