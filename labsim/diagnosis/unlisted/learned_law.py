@@ -32,7 +32,7 @@ from .hats import STEP, FreeLaw
 from .unknown import log_mean
 
 USUAL = 0.4  # of a law's unit: standard deviation of a coefficient's prior where its term is largest, the middle of SIZES
-MOST_SIMULATED = 2  # formulas, beside the best of every place
+MOST_SIMULATED = 4  # formulas, beside the best of every place
 MOST_SETTLED = (
     2  # formulas: one that is large was left up to 112 in ln evidence below its best, where runs bend
 )
