@@ -88,7 +88,8 @@ def read_request(
     columns: Mapping[str, str] | None = None,
     particle: str | None = None,
 ) -> Request:
-    """What the drop and the caller say, and the record opened; units as ``labsim.track`` has them.
+    """What the drop and the caller say, and the record opened; units as ``labsim.track`` has them. ruler : its picture, and how
+    far its ticks are apart (m).
 
     Raises MeasurementError, which names everything that is missing at once.
     """

@@ -16,6 +16,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from benchmarks.lagrangian_mesh import mesh
+from benchmarks.lagrangian_mesh.make_campaigns import SERIES
 from labsim.inference.emulation.curves import decode_speed, encode_speeds
 from labsim.inference.emulation.grid import FELT_CELLS, FELT_SPACINGS
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
@@ -23,16 +24,8 @@ from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
 
 CELLS = (5, 8, 11)
-# radius (m), mass over a bead's, speed (m/s)
-DROPS = (
-    (0.5e-3, 1.0, 0.60),
-    (0.75e-3, 1.0, 0.30),
-    (0.75e-3, 1.0, 0.50),
-    (0.75e-3, 2.5, 0.30),
-    (1.5e-3, 1.0, 0.25),
-    (1.5e-3, 1.0, 0.42),
-    (1.5e-3, 2.5, 0.22),
-)
+# radius (m), mass over a bead's, speed (m/s): the drops of the mesh's campaigns, and a small rod
+DROPS = ((0.5e-3, 1.0, 0.60), *SERIES)
 STRENGTHS = (1000.0, 2200.0)  # Pa
 LAGS = (1, 2, 4, 8)  # stretches
 # by depth: radius (m), mass over a bead's; speeds (m/s) and p_m (Pa)

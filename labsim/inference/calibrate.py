@@ -124,6 +124,8 @@ def fit_from_afar(bench: Workbench, nominal: Fit) -> Fit:
         with suppress(ExtrapolationError):  # its runs fail: not from there
             seen.append(fit_hypothesis(bench, (), (float(start), {}), iterations=0))
     best = max(seen, key=lambda fit: fit.evidence)
+    if best is nominal:
+        return nominal
     again = fit_hypothesis(bench, (), (best.log_p_m, {}), nuisances=best)
     return max((best, again), key=lambda fit: fit.evidence)
 

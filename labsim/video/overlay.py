@@ -22,7 +22,7 @@ def write_overlay(
     """Write the frames with tip and surface as an MP4 (slow motion, 15 pictures a second). Raises MeasurementError."""
     every = max(1, len(track.frame) // LONGEST_MOVIE)
     drawn = _draw(frames, track, column, surface_row, _zoom(frames.shape))
-    return write_movie((picture[..., ::-1] for i, picture in drawn if i % every == 0), path, 15.0)
+    return write_movie((picture for i, picture in drawn if i % every == 0), path, 15.0)
 
 
 def write_movie(pictures: Iterable[np.ndarray], path: Path, rate: float = 20.0) -> Path:
@@ -47,7 +47,7 @@ def draw_contact_sheet(
     wanted = set(moments)
     drawn = {}
     for i, picture in _draw(frames, track, column, surface_row, _zoom(frames.shape), wanted):
-        drawn[i] = picture[..., ::-1].copy()
+        drawn[i] = picture.copy()
     return [drawn[i] for i in moments if i in drawn]
 
 
@@ -79,6 +79,7 @@ def _draw(
     zoom: int,
     wanted: set[int] | None = None,
 ) -> Iterator[tuple[int, np.ndarray]]:
+    """Index and RGB picture of each frame that is wanted."""
     top = None
     middle = float(np.nanmedian(column)) if np.isfinite(column).any() else frames.shape[1] / 2
     for i, picture in enumerate(frames):
@@ -105,4 +106,4 @@ def _draw(
             label, colour = f"{int(track.frame[i])} rejected", RED
         cv2.putText(image, label, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 3, cv2.LINE_AA)
         cv2.putText(image, label, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
-        yield i, image
+        yield i, image[..., ::-1]

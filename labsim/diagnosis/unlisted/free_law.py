@@ -4,8 +4,8 @@
 
 h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. What every hat changes of drops
 and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian
-about nought with one size, ln p_m is flat. Their integral over the linearised data is closed:
-docs/free-law.md. Mass d may not shrink, which such coefficients do not know: its hats serve formulas (learned_law.py) alone.
+about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/free-law.md. Mass d may not
+shrink, which such coefficients do not know: its hats serve formulas (learned_law.py) alone.
 """
 
 from __future__ import annotations

@@ -33,11 +33,8 @@ COMPACTION = (
     0.13,
 )  # above φ0: half of what a tip compacts ends below 0.03, nine tenths below 0.07
 DEPTHS = (0.0, 0.5, 1.0, 2.0, 4.0)  # tip radii
-MASS_DEPTHS = (
-    0.0,
-    1.0,
-    4.0,
-)  # enough for the terms; a mass that goes up and down again would be any force of depth
+# tip radii, enough for the terms; a mass that goes up and down again would be any force of depth
+MASS_DEPTHS = (0.0, 1.0, 4.0)
 SPEEDS = (0.1, 0.3, 0.6, 1.2)  # m/s; nought at rest: a force that does not change with speed is one of depth
 
 

@@ -33,9 +33,7 @@ from .unknown import log_mean
 
 USUAL = 0.4  # of a law's unit: standard deviation of a coefficient's prior where its term is largest, the middle of SIZES
 MOST_SIMULATED = 4  # formulas, beside the best of every place
-MOST_SETTLED = (
-    2  # formulas: one that is large was left up to 112 in ln evidence below its best, where runs bend
-)
+MOST_SETTLED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
 

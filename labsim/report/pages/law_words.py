@@ -26,15 +26,6 @@ PLACE_WORDS = {
     "force of speed": "a force against the motion, over the tip's cross-section, of",
     "mass of depth": "dust that moves with the tip, over the mass of the projectile, of",
 }
-VALUE_LABELS = {
-    "strength of filling factor": "more strength (%)",
-    "force of depth": "force upwards (Pa)",
-    "force of speed": "force against the motion (Pa)",
-}
-DIRECTIONS = {
-    "force of depth": ("upwards", "downwards"),
-    "force of speed": ("against the motion", "along the motion"),
-}
 CLEAR = 2.0  # standard deviations from which a further law of several is named
 
 
@@ -71,10 +62,7 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
         if law.law.over == "filling factor":
             size = show_number(100 * value, "{:+.0f}")
             return f"{size} ± {100 * sigma:.0f} %", f"of the strength {_say_place(law)}"
-        return (
-            f"{show_number(value, '{:+.0f}')} ± {sigma:.0f} {law.law.value_unit}",
-            f"on the tip {_say_place(law)}",
-        )
+        return f"{show_number(value, '{:+.0f}')} ± {sigma:.0f} Pa", f"on the tip {_say_place(law)}"
     if "depth" in MISSING[found.unknown.block]:
         return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"
     return None
@@ -86,7 +74,8 @@ def say_law(law: RecoveredLaw) -> str:
     if law.law.over == "filling factor":
         word = "more" if value > 0 else "less"
         return f"{100 * abs(value):.0f} ± {100 * sigma:.0f} % {word} compressive strength {_say_place(law)}"
-    word = DIRECTIONS[law.law.name][value < 0]
+    towards = {"depth": ("upwards", "downwards"), "speed": ("against the motion", "along the motion")}
+    word = towards[law.law.over][value < 0]
     return f"a force on the tip of {abs(value):.0f} ± {sigma:.0f} Pa of its cross-section {word} {_say_place(law)}"
 
 
@@ -254,7 +243,9 @@ def _show(law: RecoveredLaw, value: float) -> str:
 
 
 def value_label(law: RecoveredLaw) -> str:
-    return VALUE_LABELS[law.law.name]
+    if law.law.over == "filling factor":
+        return "more strength (%)"
+    return {"depth": "force upwards (Pa)", "speed": "force against the motion (Pa)"}[law.law.over]
 
 
 def place_label(law: RecoveredLaw) -> str:
