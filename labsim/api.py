@@ -140,6 +140,11 @@ def reduce_scan(
     settings
         As ``labsim.ct.reduce_scan`` takes them (cell, guard …).
 
+    Returns
+    -------
+    ReducedScan
+        Its ``map`` has filling factor and sigma on cells of r and z, in SI.
+
     Raises
     ------
     CampaignError, MeasurementError
@@ -207,9 +212,26 @@ def simulate(
 ) -> DropRun | list[DropRun]:
     """Simulate one drop, or many at once; what the store holds is read, not run.
 
-    setting : labsim.DropSetting. store : folder of the stored runs (default: LABSIM_STORE or the user's cache). workers :
-    processes (default: one a core). scheduler : address of a Dask scheduler. Returns a DropRun, or a list in the same order.
-    Raises SimulationError for a setting outside the solver's limits or a run that failed.
+    Parameters
+    ----------
+    setting : DropSetting, or a sequence of them
+        Drops or pushes.
+    store : Path or str, optional
+        Folder of the stored runs. Default: LABSIM_STORE, or the user's cache.
+    workers : int, optional
+        Processes. Default: one a core.
+    scheduler : str, optional
+        Address of a Dask scheduler, in place of processes.
+
+    Returns
+    -------
+    DropRun or list of DropRun
+        In the order of the settings.
+
+    Raises
+    ------
+    SimulationError
+        For a setting outside the solver's limits, or a run that failed.
     """
     from .runs.store import require_runs
     from .sph import DropSetting, check_setting
@@ -231,8 +253,27 @@ def calibrate(
 ) -> Calibration | SummaryCalibration:
     """The posterior of p_m (Pa), and of effects named in ``parameters``.
 
-    settings : workers, scheduler, seed, progress, and what ``labsim.inference.calibrate.calibrate`` takes for tracks and
-    ``labsim.inference.published.calibrate.calibrate_summary`` for published figures. Raises LabsimError.
+    Parameters
+    ----------
+    campaign : Campaign, Path or str
+        One that was read, or its folder.
+    parameters : sequence of str
+        "p_m", and effects as "shear_strength" or "shear_strength.factor".
+    store : Path or str, optional
+        Folder of the stored runs. Default: LABSIM_STORE, or the user's cache.
+    settings
+        workers, scheduler, seed, progress, and what ``labsim.inference.calibrate.calibrate`` takes for tracks and
+        ``labsim.inference.published.calibrate.calibrate_summary`` for published figures.
+
+    Returns
+    -------
+    Calibration or SummaryCalibration
+        Its ``posterior`` opens with ArviZ; the second for published figures.
+
+    Raises
+    ------
+    LabsimError
+        For an unknown parameter, and where measuring or simulating fails.
     """
     read = _read(campaign)
     if read.has_records:
@@ -345,7 +386,20 @@ def write_report(
 def summarise(found: object) -> str:
     """A record or a result in words: of a calibration or a diagnosis what the command prints, of a record its own summary.
 
-    Raises TypeError for what is neither.
+    Parameters
+    ----------
+    found : Calibration, Diagnosis, or a record
+        What a verb of labsim returned.
+
+    Returns
+    -------
+    str
+        Lines of text.
+
+    Raises
+    ------
+    TypeError
+        Of anything else.
     """
     from .records import Summarised
 
@@ -424,6 +478,11 @@ def tabulate(thing: object) -> pd.DataFrame:
     thing : Track, DecelerationCurve, CompressedVolume, DropRun, Calibration, Diagnosis, or what ``labsim.track`` returns
         Of the pair that ``labsim.track`` returns the curve is taken, the track where there is none; of a calibration or diagnosis
         the draws of its posterior. Maps are not tables: ``labsim.ct.make_dataset(reduced)`` gives xarray.
+
+    Returns
+    -------
+    DataFrame
+        With a unit in the name of each column.
 
     Raises
     ------

@@ -45,7 +45,23 @@ from .tracks import read_rows
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """Read and check a whole campaign folder. Raises CampaignError."""
+    """Read and check a whole campaign folder.
+
+    Parameters
+    ----------
+    folder : Path or str
+        That holds campaign.toml. Records themselves are read later, when they are measured.
+
+    Returns
+    -------
+    Campaign
+        What the files state, in SI.
+
+    Raises
+    ------
+    CampaignError
+        For what cannot be used, with file, key and remedy.
+    """
     folder = Path(folder)
     if not folder.exists():
         raise CampaignError(folder, "", "no such folder; give the folder that holds campaign.toml")

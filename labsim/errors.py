@@ -8,7 +8,17 @@ from __future__ import annotations
 
 
 class LabsimError(Exception):
-    """Anything labsim reports to its user instead of a traceback."""
+    """Anything labsim reports to its user instead of a traceback.
+
+    Parameters
+    ----------
+    where : object
+        File or folder that it is about.
+    key : str
+        Which of its values; empty for the whole.
+    message : str
+        What is wrong with it, and what would do.
+    """
 
     def __init__(self, where: object, key: str, message: str) -> None:
         self.where, self.key, self.message = str(where), key, message

@@ -45,7 +45,13 @@ class Summarised:
 
 @dataclass(frozen=True)
 class Measured:
-    """A value with its standard uncertainty, in the same SI unit."""
+    """A value with its standard uncertainty.
+
+    Parameters
+    ----------
+    value, sigma : float
+        In the same SI unit; sigma is one standard deviation.
+    """
 
     value: float
     sigma: float
@@ -69,7 +75,30 @@ class Material:
     """Strengths and elasticity of the dust (campaign.toml ``[material]``), p_m included.
 
     Σ(φ) = p_m ((φ - φ1)/(φ2 - φ))^(Δ ln 10); T(φ) = -10^(a + b φ) Pa; Y = shear_factor √(Σ|T|);
-    K(φ) = bulk_modulus (φ/0.15)^bulk_exponent; μ = shear_to_bulk K. Source: Güttler et al. (2009), eqs. 4-6.
+    K(φ) = bulk_modulus (φ/0.15)^bulk_exponent; μ = shear_to_bulk K.
+
+    Parameters
+    ----------
+    p_m : float
+        Pa, the pressure scale of the compressive strength Σ.
+    phi_1, phi_2, delta : float
+        Filling factors between which Σ rises, and how steeply.
+    tensile_log10_a, tensile_log10_b : float
+        a and b of the tensile strength T.
+    shear_factor : float
+        Of the shear strength Y.
+    bulk_modulus, bulk_exponent, shear_to_bulk : float
+        Pa at a filling factor of 0.15; its exponent; shear over bulk modulus.
+    contact_friction : float
+        Coefficient of friction between dust and projectile.
+    law : str
+        A file of ``labsim/sph/materials``, or the path of one.
+    constants : tuple of (str, float)
+        Of another law: those of its parameters that are not at their defaults.
+
+    References
+    ----------
+    Güttler et al. (2009), ApJ 701, 130, eqs. 4-6.
     """
 
     p_m: float = 1300.0  # Pa
@@ -94,7 +123,19 @@ class Material:
 
 @dataclass(frozen=True)
 class Projectile:
-    """A rigid projectile. A hemisphere is the end of a rod of the same radius; a cylinder is planar only."""
+    """A rigid projectile. A hemisphere is the end of a rod of the same radius; a cylinder is planar only.
+
+    Parameters
+    ----------
+    tip : str
+        A file of ``labsim/sph/tips``, or the path of one.
+    tip_radius, length : float
+        m; length is that of the whole rod, 0 where it does not matter.
+    mass, mass_sigma : float
+        kg (planar: kg per metre of cylinder), with its standard deviation.
+    shape : tuple of (str, float)
+        The tip's own numbers that are not at their defaults, SI.
+    """
 
     tip: str  # a file of labsim/sph/tips, or the path of one
     tip_radius: float  # m
@@ -122,6 +163,18 @@ class Motion:
 
 @dataclass(frozen=True)
 class Camera:
+    """A camera as it is stated.
+
+    Parameters
+    ----------
+    frame_rate : float
+        Hz.
+    pixel_size, pixel_size_sigma : float
+        m in the plane of the fall; its standard deviation where the scale was measured.
+    surface_row, surface_row_sigma : float
+        px, row of the dust's surface, with its standard deviation. Rows grow downwards.
+    """
+
     frame_rate: float  # Hz
     pixel_size: float  # m
     surface_row: float  # px, rows grow downwards

@@ -20,17 +20,20 @@ import numpy as np
 
 from benchmarks.accuracy.own_campaigns import STANDARD, open_campaign
 from labsim.diagnosis.campaign import diagnose_campaign
+from labsim.effects.law_places import LAW_PLACES
 from labsim.inference.truths.synthetic import LABORATORY, Hidden, TruthTable, measure_hidden
 from labsim.report.pages.law_words import describe_learned
 from labsim.runs.store import RunStore
 
-# name -> place and (x, radius m) -> value in Pa or share
+# name -> place and x -> value in Pa or share, or ms for x mm
 HIDDEN = {
     "inertial_drag": ("force of speed", "300.0 * x**2"),
     "drag_to_the_1.5": ("force of speed", "300.0 * x**1.5"),
     "depth_spring": ("force of depth", "150.0 * x"),
     "film_at_1.3": ("force of depth", "400.0 * np.exp(-0.5 * ((x - 1.3) / 0.3) ** 2)"),
     "hardening": ("strength of filling factor", "0.6 * 10 * x"),
+    "size": ("strength of size", "0.5 * np.log(x)"),
+    "rows_one_after_another": ("clock of depth", "0.25 * x"),
     "nothing": ("force of speed", "0.0 * x"),
 }
 EFFECT = '''"""Hidden here alone."""
@@ -38,7 +41,7 @@ EFFECT = '''"""Hidden here alone."""
 import numpy as np
 
 from labsim.effects import Parameter, Uniform
-from labsim.effects.terms import Term, add_term
+from labsim.effects.terms import Term, add_term, see_term
 
 title = "hidden"
 kind = "material"
@@ -49,8 +52,8 @@ expect = {{}}
 TERM = Term("hidden", "hidden", "{place}", "1", "", lambda x: {shape} + 0.0 * x, "")
 
 
-def change_setting(setting, values, place):
-    return add_term(setting, TERM, values["share"])
+def change_{of}({of}, values, place):
+    return {verb}_term({of}, TERM, values["share"]{factor})
 '''
 
 
@@ -69,7 +72,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             own = Path(folder) / "effects" / "hidden.py"
             own.parent.mkdir()
-            own.write_text(EFFECT.format(place=place, shape=shape))
+            camera = LAW_PLACES[place].see is not None
+            of, verb = ("instrument", "see") if camera else ("setting", "add")
+            factor = f" * {eval(shape, {'x': 1.0})}" if camera else ""
+            own.write_text(EFFECT.format(place=place, shape=shape, of=of, verb=verb, factor=factor))
             truth = TruthTable(
                 replace(campaign, folder=Path(folder)), RunStore(given.store), workers=given.workers
             )

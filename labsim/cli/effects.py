@@ -29,7 +29,7 @@ LEARNED = '''"""{term.title}, learned by labsim diagnose ({out}).
 """
 
 from labsim.effects import Normal, Parameter
-from labsim.effects.terms import add_term, list_terms
+from labsim.effects.terms import {verb}_term, list_terms
 
 TERM = list_terms()["{name}"]
 
@@ -52,8 +52,8 @@ references = ("{term.source}",)
 expect = {{}}
 
 
-def change_setting(setting, values, place):
-    return add_term(setting, TERM, values["coefficient"])
+def change_{of}({of}, values, place):
+    return {verb}_term({of}, TERM, values["coefficient"])
 '''
 
 
@@ -134,7 +134,8 @@ def write_learned(out: Path, campaign: Path) -> list[Path]:
         path.write_text(
             LEARNED.format(
                 term=term, name=name, out=out.name, low=low, high=high, size=float(f"{abs(coefficient):.3g}"),
-                kind="material" if term.place.startswith("strength") else "contact",
+                kind="measurement" if term.acts.see else "material" if term.place.startswith("strength") else "contact",
+                of="instrument" if term.acts.see else "setting", verb="see" if term.acts.see else "add",
             ),
             encoding="utf-8",
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """Large effects: what a tangent at the nominal fit cannot see because p_m has run away to make up for it.
 
 Where the nominal model fails, every effect that costs runs is fitted by Gauss-Newton on fingerprints (coarse runs), from the
-nominal p_m, or the end of its range, and from strengths a factor REACH above and below it, the effect's amplitude taken first
+nominal p_m, or the end of its range, and from strengths above and below it (FACTORS), the effect's amplitude taken first
 at that strength. The best of the three replaces the tangent's word.
 """
 
@@ -9,17 +9,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from ..errors import ExtrapolationError
 from ..inference.fits.blocks import solve_globals
-from ..inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, goodness_of_fit, with_probes
+from ..inference.fits.fitting import (
+    DOUBTFUL,
+    REJECTED,
+    Fit,
+    Hypothesis,
+    fit_hypothesis,
+    goodness_of_fit,
+    with_probes,
+)
 from ..inference.workbench import Workbench
 from .screen import Screening
 from .shapes import cause
 
-REACH = 2.5  # factor on p_m
+FACTORS = (1.0, 2.5, 1 / 2.5)  # on p_m, of the strengths that fits begin at
 EXPLORED = ("material", "contact")  # kinds that p_m can make up for; samples are seen in the scans
 PROMISING = 3.0  # ln Bayes factor of the screening from which it is
 NOWHERE = 2e4  # ln likelihood behind it at which one is not followed at all
@@ -49,46 +58,60 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
 
     fits : found so far.
     """
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    starts = [nominal.log_p_m]
-    for shift in (math.log(REACH), -math.log(REACH)):
-        if low <= nominal.log_p_m + shift <= high:
-            starts.append(nominal.log_p_m + shift)
     found: dict[str, Fit] = {}
     top = max([nominal.evidence, *(fit.evidence for fit in fits)])
     for score in screening.scores:
         name = score.name
         if not bench.costs_runs(name) or bench.effects[name].kind not in EXPLORED or cause(name) != name:
             continue
-        for start in starts:
-            try:
-                first = _start_at(bench, nominal, name, start)
-                begin = (start, {name: first})
-                fit = fit_hypothesis(
-                    bench,
-                    (name,),
-                    begin,
-                    coarse=True,
-                    nuisances=nominal,
-                    iterations=FIRST_STEPS,
-                    least=top - NOWHERE,
-                )
-                if fit.evidence > top - HOPELESS:
-                    begin = (fit.log_p_m, fit.values)
-                    fit = fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=fit)
-            except ExtrapolationError:  # runs that lead nowhere: not from this start
-                continue
-            if name not in found or fit.evidence > found[name].evidence:
-                found[name] = fit
+        fit = fit_from_strengths(bench, nominal, (name,), top)
+        if fit is not None:
+            found[name] = fit
             top = max(top, fit.evidence)
     return found
 
 
-def _start_at(bench: Workbench, nominal: Fit, name: str, log_p_m: float) -> float:
-    """Amplitude that the data ask for at a strength, by the tangent there, within two of its steps."""
-    parameter = bench.effects[name].amplitudes[0]
-    bench.require_fingerprints([name], log_p_m, f"{name} at another p_m")
-    blocks = with_probes(bench, nominal, [name], log_p_m)
-    step, *_ = solve_globals(blocks, [name], {name: (0.0, parameter.scale)})
-    reach = 2 * abs(parameter.step)
-    return float(np.clip(step[0], -reach, reach))
+def fit_from_strengths(
+    bench: Workbench, nominal: Fit, names: Hypothesis, top: float, factors: Sequence[float] = FACTORS
+) -> Fit | None:
+    """The best coarse fit of one hypothesis from several strengths; None where its runs lead nowhere.
+
+    top : ln evidence of the best that is known; a start far behind it is not followed. factors : on the nominal p_m.
+    """
+    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    found: Fit | None = None
+    for shift in np.log(factors):
+        start = nominal.log_p_m + float(shift)
+        if shift != 0.0 and not low <= start <= high:
+            continue
+        with suppress(ExtrapolationError):  # runs that lead nowhere: not from this start
+            begin = (start, _start_at(bench, nominal, names, start))
+            fit = fit_hypothesis(
+                bench,
+                names,
+                begin,
+                coarse=True,
+                nuisances=nominal,
+                iterations=FIRST_STEPS,
+                least=top - NOWHERE,
+            )
+            if fit.evidence > top - HOPELESS:
+                begin = (fit.log_p_m, fit.values)
+                fit = fit_hypothesis(bench, names, begin, coarse=True, nuisances=fit)
+            found = fit if found is None or fit.evidence > found.evidence else found
+            top = max(top, fit.evidence)
+    return found
+
+
+def _start_at(bench: Workbench, nominal: Fit, names: Hypothesis, log_p_m: float) -> dict[str, float]:
+    """Amplitudes that the data ask for at a strength, by the tangents there, within two of their steps."""
+    parameters = {name: bench.effects[name].amplitudes[0] for name in names}
+    costly = [name for name in names if bench.costs_runs(name)]
+    bench.require_fingerprints(costly, log_p_m, f"{' and '.join(names)} at another p_m")
+    blocks = with_probes(bench, nominal, names, log_p_m)
+    step, *_ = solve_globals(blocks, names, {name: (0.0, each.scale) for name, each in parameters.items()})
+    reach = {name: 2 * abs(each.step) for name, each in parameters.items()}
+    return {
+        name: float(np.clip(amplitude, -reach[name], reach[name]))
+        for name, amplitude in zip(names, step, strict=True)
+    }

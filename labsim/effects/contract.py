@@ -140,6 +140,10 @@ class Instrument:
     pixel_factor: float = 1.0  # true over stated pixel size
     rate_factor: float = 1.0  # true over stated frame rate
     row_offset_px: float = 0.0  # true minus stated row of the surface, px
+    row_delay: float = (
+        0.0  # s/m, by which a lower point is exposed later, where rows are read one after another
+    )
+    clock_drift: float = 0.0  # 1/s, share by which the time between frames grows in a second from contact on
     ct_scale: float = 1.0  # true over stated grey level per density
     ct_blur: float = (
         0.0  # m, standard deviation of additional point spread, in quadrature with the assumed one
@@ -158,6 +162,10 @@ class Instrument:
     def stated_time(self, time: FloatArray) -> FloatArray:
         """Time (s) that the stated frame rate gives to an instant of true time (s)."""
         return np.asarray(time) * self.rate_factor
+
+    def true_time(self, time: FloatArray) -> FloatArray:
+        """The reverse."""
+        return np.asarray(time) / self.rate_factor
 
     def stated_depth(self, depth: FloatArray, pixel_size: float) -> FloatArray:
         """Depth (m) that the stated pixel size (m) and surface row give to a true depth (m)."""

@@ -42,8 +42,9 @@ from ..sph import DropSetting
 from ..sph.materials import list_laws
 from ..text_files import load_toml
 from .contract import Effect, Instrument, Place, Values
+from .law_places import LAW_PLACES, Knots
 from .loading import list_effects
-from .terms import LEAST, PLACES, Knots, Law, apply_law, list_terms
+from .terms import Law, apply_law, list_terms, see_term
 
 FORMAT = 1
 P_M_RANGE = (1.0, 1.0e8)  # Pa
@@ -120,34 +121,27 @@ def read_model(path: Path | str, effects: Mapping[str, Effect] | None = None) ->
 
 def _read_law(path: Path, table: Mapping[str, Any]) -> Law:
     known = list_terms()
-    places = {place.replace(" ", "_"): place for place in PLACES}
+    places = {place.key: place for place in LAW_PLACES.values() if place.add}
     _refuse_others(path, "law", table, [*places, *known])
     terms = []
     for name, value in table.items():
         if name in known:
             terms.append((name, _number(path, f"law.{name}", value, *known[name].limits)))
-    tables = [(places[key], _read_knots(path, f"law.{key}", table[key])) for key in table if key in places]
-    for place, knots in tables:
-        for knot, value in knots:
-            if place == "force of speed" and value < 0:
-                raise EffectError(
-                    path,
-                    "law.force_of_speed",
-                    f"{value:g} Pa at {knot:g} m/s pushes along the motion; write 0 or more",
-                )
-            if place == "mass of depth" and value < 0:
-                raise EffectError(
-                    path,
-                    "law.mass_of_depth",
-                    f"{value:g} at {knot:g} tip radii takes mass away; write 0 or more",
-                )
-            if place == "strength of filling factor" and value < LEAST - 1:
-                raise EffectError(
-                    path,
-                    "law.strength_of_filling_factor",
-                    f"{value:g} at {knot:g} leaves no strength; write {LEAST - 1:g} or more",
-                )
+    tables = []
+    for key in table:
+        if key not in places:
+            continue
+        place = places[key]
+        tables.append((place.name, _read_knots(path, f"law.{key}", table[key])))
+        for knot, value in tables[-1][1]:
+            if value < place.least:
+                said = f"{_show(value, place.value_unit)} at {_show(knot, place.unit)} {place.breaks}"
+                raise EffectError(path, f"law.{key}", f"{said}; write {place.least:g} or more")
     return Law(tuple(terms), tuple(tables))
+
+
+def _show(value: float, unit: str) -> str:
+    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"
 
 
 def _read_knots(path: Path, key: str, value: Any) -> Knots:
@@ -192,7 +186,8 @@ def write_model(
         lines.append(f"{name} = {float(value)!r}  # {term.unit}, times {term.formula}: {term.title}")
     for place, knots in model.law.tables:
         rows = ", ".join(f"[{float(x)!r}, {float(y)!r}]" for x, y in knots)
-        lines.append(f"{place.replace(' ', '_')} = [{rows}]  # {PLACES[place][0]}, {PLACES[place][1]}")
+        there = LAW_PLACES[place]
+        lines.append(f"{there.key} = [{rows}]  # {there.unit}, {there.value_unit}")
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     os.replace(aside, path)
@@ -248,6 +243,8 @@ def make_instrument(model: Model, place: Place, effects: Mapping[str, Effect] | 
     instrument = Instrument()
     for name, values in model.effects:
         instrument = known[name].apply_to_instrument(instrument, values, place)
+    for name, coefficient in model.law.terms:
+        instrument = see_term(instrument, list_terms()[name], coefficient)
     return instrument
 
 

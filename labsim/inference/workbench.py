@@ -263,6 +263,8 @@ class Workbench:
     def log_offsets(self, amplitudes: Mapping[str, float]) -> dict[str, float]:
         """Change of ln p_m per drop by effects that act on the strength alone."""
         offsets = {name: 0.0 for name in self.places}
+        projectiles = {each.name: each.projectile.simulated for each in self.campaign.drops}
+        projectiles |= {each.name: each.projectile.simulated for each in self.campaign.scans}
         changes = [
             (effect_name, self.at(effect_name, amplitude))
             for effect_name, amplitude in amplitudes.items()
@@ -274,6 +276,8 @@ class Workbench:
         for effect_name, values in changes:
             for name, place in self.places.items():
                 setting = self.state(self.families[0], name)
+                if name in projectiles:
+                    setting = setting.replace(projectile=projectiles[name])
                 changed = self.effects[effect_name].apply(setting, values, place)
                 offsets[name] += math.log(read_value(changed.material) / read_value(setting.material))
         return offsets

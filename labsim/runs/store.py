@@ -53,6 +53,16 @@ class RunStore:
     """A folder of runs. Any number of processes may use it at once.
 
     ``new`` and ``reused`` count what ``get_many`` simulated and found since the store was opened.
+
+    Parameters
+    ----------
+    folder : Path or str, optional
+        It is made where it is missing. Default: LABSIM_STORE, or the user's cache.
+
+    Raises
+    ------
+    InferenceError
+        Where the folder cannot be made.
     """
 
     def __init__(self, folder: Path | str | None = None) -> None:

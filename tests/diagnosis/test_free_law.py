@@ -15,11 +15,12 @@ from labsim.diagnosis.campaign import judge_campaign
 from labsim.diagnosis.gain import predict_held_out
 from labsim.diagnosis.unlisted import free_law
 from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate, is_wanted
-from labsim.diagnosis.unlisted.hats import DEPTHS, PRESSURE, SPEEDS, FreeLaw, make_hats
+from labsim.diagnosis.unlisted.hats import FreeLaw, make_hats
 from labsim.diagnosis.unlisted.learned_law import learn_law
 from labsim.diagnosis.unlisted.unknown import FREEDOMS
 from labsim.effects import Place, list_effects
-from labsim.effects.terms import combine
+from labsim.effects.law_places import LAW_PLACES, combine
+from labsim.effects.terms import list_terms
 from labsim.inference.fits.blocks import Block, solve_globals
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
@@ -31,10 +32,15 @@ from labsim.sph.sirono import tabulate_strengths
 CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")
 RADIUS = 0.5e-3  # m
 DUST = (0.15, 0.18, 0.22, 0.28)
+STRENGTH, DEPTH, SPEED = (
+    LAW_PLACES[name] for name in ("strength of filling factor", "force of depth", "force of speed")
+)
+DEPTHS, (_, *SPEEDS) = DEPTH.knots, SPEED.knots
+PRESSURE = DEPTH.scale
 LAWS = (
-    FreeLaw("strength of filling factor", "filling factor", "1", DUST, DUST, (0.15, 0.28), "1", 1.0),
-    FreeLaw("force of depth", "depth", "tip radii", DEPTHS, DEPTHS, (0.0, 4.0), "Pa", PRESSURE),
-    FreeLaw("force of speed", "speed", "m/s", (0.0, *SPEEDS), SPEEDS, (0.0, 1.2), "Pa", PRESSURE),
+    FreeLaw(STRENGTH, DUST, DUST, (0.15, 0.28)),
+    FreeLaw(DEPTH, DEPTHS, DEPTHS, (0.0, 4.0)),
+    FreeLaw(SPEED, SPEED.knots, SPEED.knots[1:], (0.0, 1.2)),
 )
 
 # ---------------------------------------------------------------- the integral
@@ -244,7 +250,8 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     found = judge_campaign(bench, fit_hypothesis(bench, (), (math.log(1300.0), {})))
     assert found.verdict.word == "unknown" and found.verdict.probabilities[0][1] > 0.5
     unknown = found.unknown
-    assert set(unknown.evidences) == {*FREEDOMS, *EMBEDDED} - {
+    without_runs = {term.title for term in list_terms().values() if term.acts.see}
+    assert set(unknown.evidences) - without_runs == {*FREEDOMS, *EMBEDDED} - {
         name for name in FREEDOMS if "undisturbed dust" in FREEDOMS[name].kinds
     }
     assert unknown.embedded == "force of depth"

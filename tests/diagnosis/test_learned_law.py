@@ -6,30 +6,28 @@ import numpy as np
 import pytest
 
 from labsim.diagnosis.unlisted.free_law import Tangents, gather
-from labsim.diagnosis.unlisted.hats import DEPTHS, PRESSURE, SPEEDS, STEP, FreeLaw
+from labsim.diagnosis.unlisted.hats import STEP, USUAL, FreeLaw, find_peak, make_effect
 from labsim.diagnosis.unlisted.learned_law import (
     MOST_SIMULATED,
-    USUAL,
     choose_formulas,
-    find_peak,
-    make_effect,
     share_hats,
     weigh_formulas,
 )
+from labsim.effects.law_places import LAW_PLACES
 from labsim.effects.terms import add_term, list_terms
 from labsim.inference.fits.blocks import Block
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
 
-LAWS = (
-    FreeLaw("force of depth", "depth", "tip radii", DEPTHS, DEPTHS, (0.0, 4.0), "Pa", PRESSURE),
-    FreeLaw("force of speed", "speed", "m/s", (0.0, *SPEEDS), SPEEDS, (0.0, 1.2), "Pa", PRESSURE),
-)
+DEPTH, SPEED = LAW_PLACES["force of depth"], LAW_PLACES["force of speed"]
+SPEEDS = SPEED.knots[1:]
+LAWS = (FreeLaw(DEPTH, DEPTH.knots, DEPTH.knots, (0.0, 4.0)), FreeLaw(SPEED, SPEED.knots, SPEEDS, (0.0, 1.2)))
 HATS = [hat for law in LAWS for hat in law.hats]
 TERMS = {name: term for name, term in list_terms().items() if term.place in {law.name for law in LAWS}}
 PEAKS = {
     name: find_peak(term, next(law for law in LAWS if law.name == term.place)) for name, term in TERMS.items()
 }
+UNITS = {name: TERMS[name].acts.scale / peak for name, peak in PEAKS.items()}
 LIMITS = (-50.0, 50.0)
 
 
@@ -50,7 +48,7 @@ def made_up(hidden: dict[str, float], seed: int = 2) -> Tangents:
 
 @pytest.mark.parametrize("name", ["inertial_drag", "root_drag", "depth_spring", "film_at_1", "surface_layer"])
 def test_the_hidden_term_comes_first_with_its_size(name):
-    ranked = weigh_formulas(made_up({name: 0.5}), TERMS, PEAKS, LIMITS)
+    ranked = weigh_formulas(made_up({name: 0.5}), TERMS, UNITS, LIMITS)
     names, marginal = ranked[0]
     assert names == (name,)
     sigma = np.sqrt(marginal.covariance[1, 1])
@@ -58,22 +56,22 @@ def test_the_hidden_term_comes_first_with_its_size(name):
 
 
 def test_two_hidden_terms_are_named_together():
-    ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "film_at_2": -0.4}), TERMS, PEAKS, LIMITS)
+    ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "film_at_2": -0.4}), TERMS, UNITS, LIMITS)
     assert set(ranked[0][0]) == {"inertial_drag", "film_at_2"}
 
 
 def test_a_force_along_the_motion_is_never_proposed():
     """It would gain energy on a closed way; of depth either sign is a force that nature has."""
-    for names, marginal in weigh_formulas(made_up({"inertial_drag": -0.5}), TERMS, PEAKS, LIMITS):
+    for names, marginal in weigh_formulas(made_up({"inertial_drag": -0.5}), TERMS, UNITS, LIMITS):
         for name, c in zip(names, marginal.coefficients[1:], strict=True):
             assert c >= 0 or TERMS[name].place == "force of depth"
-    names, marginal = weigh_formulas(made_up({"depth_spring": -0.5}), TERMS, PEAKS, LIMITS)[0]
+    names, marginal = weigh_formulas(made_up({"depth_spring": -0.5}), TERMS, UNITS, LIMITS)[0]
     assert names == ("depth_spring",) and marginal.coefficients[1] < 0
 
 
 def test_every_place_has_its_best_term_simulated():
     """However far behind it stands: what is weighed is linear about a p_m that may be far off."""
-    ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "viscous_drag": 0.2}), TERMS, PEAKS, LIMITS)
+    ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "viscous_drag": 0.2}), TERMS, UNITS, LIMITS)
     chosen = choose_formulas(ranked, TERMS)
     assert chosen[:MOST_SIMULATED] == ranked[:MOST_SIMULATED]
     assert {TERMS[names[0]].place for names, _ in chosen if len(names) == 1} == {law.name for law in LAWS}
@@ -84,14 +82,14 @@ def test_where_nothing_is_hidden_no_pair_stands_out():
     """A second term has to promise 3 in ln evidence over the better of the two."""
     pairs = 0
     for seed in range(4):
-        ranked = weigh_formulas(made_up({}, seed), TERMS, PEAKS, LIMITS)
+        ranked = weigh_formulas(made_up({}, seed), TERMS, UNITS, LIMITS)
         pairs += len(ranked[0][0]) - 1
     assert pairs <= 1
 
 
 def test_a_term_is_measured_where_the_data_are():
     """Its unit is that at the fastest drop, not at a knot beyond; a film between two knots is as high as any other."""
-    slow = FreeLaw("force of speed", "speed", "m/s", (0.0, *SPEEDS), SPEEDS, (0.0, 0.7), "Pa", PRESSURE)
+    slow = FreeLaw(SPEED, SPEED.knots, SPEEDS, (0.0, 0.7))
     assert find_peak(TERMS["inertial_drag"], slow) == pytest.approx(0.49)
     for name in ("film_at_1_5", "film_at_3"):
         assert PEAKS[name] == pytest.approx(1.0, abs=0.01)

@@ -12,9 +12,10 @@ import pytest
 
 from labsim.campaign import read_campaign
 from labsim.cli.effects import write_learned
-from labsim.effects import list_effects
-from labsim.effects.model import Model, apply_model, read_model, write_model
-from labsim.effects.terms import LEAST, PLACES, REACH, Law, add_term, apply_law, list_terms
+from labsim.effects import Instrument, list_effects
+from labsim.effects.law_places import LAW_PLACES, LEAST
+from labsim.effects.model import Model, apply_model, make_instrument, read_model, write_model
+from labsim.effects.terms import Law, add_term, apply_law, list_terms, see_term
 from labsim.errors import EffectError
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, check_setting, simulate
@@ -28,14 +29,15 @@ TERMS = list_terms()
 @pytest.mark.parametrize("name", TERMS)
 def test_every_term_is_what_its_page_says(name):
     term = TERMS[name]
-    assert term.place in PLACES and term.title and term.formula and term.source and term.name == name
-    places = np.linspace(0.0, REACH[term.place], 50)
+    assert term.place in LAW_PLACES and term.title and term.formula and term.source and term.name == name
+    begin = 0.1 if term.acts.over == "radius of the tip" else 0.0
+    places = np.linspace(begin, term.acts.reach, 50)
     values = term.shape(places)
     assert values.shape == places.shape and np.all(np.isfinite(values)) and np.any(values != 0)
     low, high = term.limits
     assert low <= 0.0 <= high
     assert add_term(SETTING, term, 0.0) is SETTING
-    if term.place in ("force of speed", "mass of depth"):
+    if term.acts.least == 0.0:
         assert np.all(min(max(c, -1e9), 1e9) * values.min() >= 0 for c in (low, high))
     if term.place == "strength of filling factor":
         hardest = add_term(SETTING, term, max(low, -100.0)).strength_shape
@@ -73,12 +75,27 @@ def test_mass_is_a_share_of_the_projectile_s_and_grows_no_less():
     assert np.all(np.diff(cap[:, 1]) >= 0)
 
 
+def test_a_strength_that_goes_with_size_is_a_power_of_the_radius():
+    """In a drop it is another p_m; no run is needed to know what it changes."""
+    small = SETTING.replace(projectile=replace(SETTING.projectile, tip_radius=0.25e-3))
+    factors = [
+        add_term(each, TERMS["size_power"], 0.4).material.p_m / each.material.p_m for each in (SETTING, small)
+    ]
+    assert factors[0] == pytest.approx(0.5**0.4) and factors[0] / factors[1] == pytest.approx(2.0**0.4)
+    law = Law((), (("strength of size", ((0.5, 0.1), (1.0, 0.0))),))
+    assert apply_law(SETTING, law).material.p_m == pytest.approx(SETTING.material.p_m * math.exp(0.1))
+
+
 def test_a_law_survives_its_file_and_reaches_the_drop(tmp_path):
     law = Law((("inertial_drag", 120.5),), (("force of depth", ((0.0, 0.0), (1.0, 80.0), (2.0, -3.25))),))
     model = Model(1012.0, (), (), law)
     file = write_model(tmp_path / "model.toml", model)
     assert read_model(file) == model
     assert "# Pa s²/m², times v²" in file.read_text(encoding="utf-8")
+    shutter = replace(model, law=Law((("rolling_shutter", 0.2),)))
+    assert read_model(write_model(tmp_path / "shutter.toml", shutter)) == shutter
+    assert make_instrument(shutter, None).row_delay == 0.2
+    assert apply_model(SETTING, shutter, None).force_of_speed == ()
     made = apply_model(SETTING, model, None)
     assert made.material.p_m == 1012.0 and made.force_of_speed and made.force_of_depth
 
@@ -130,8 +147,12 @@ def test_a_learned_term_becomes_an_effect_of_the_campaign(tmp_path, name):
     [path] = write_learned(tmp_path / "out", campaign)
     effect = list_effects(read_campaign(campaign))[path.stem]
     assert effect.title == TERMS[name].title and effect.amplitudes[0].unit == TERMS[name].unit
-    made = effect.apply(SETTING, {"coefficient": size}, None)
-    assert made == add_term(SETTING, TERMS[name], size) != SETTING
+    if TERMS[name].acts.see:
+        seen = effect.apply_to_instrument(Instrument(), {"coefficient": size}, None)
+        assert seen == see_term(Instrument(), TERMS[name], size) != Instrument()
+    else:
+        made = effect.apply(SETTING, {"coefficient": size}, None)
+        assert made == add_term(SETTING, TERMS[name], size) != SETTING
     with pytest.raises(EffectError, match="is there already"):
         write_learned(tmp_path / "out", campaign)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from labsim.effects import LogNormal, Parameter
+from labsim.effects import Instrument, LogNormal, Parameter
 from labsim.errors import ExtrapolationError
 from labsim.inference.emulation.curves import FRACTIONS, decode_depth, decode_rate, encode_run
 from labsim.inference.emulation.forward import Instant, ResponseTable, predict_depth, predict_speed
@@ -79,19 +79,34 @@ def test_prediction_is_continuous_at_contact_and_scales_with_the_instrument():
     code, instant = sine_code(), Instant(5e-3, math.log(0.785), 0.0)
     time = np.array([5e-3 - 1e-9, 5e-3 + 1e-9])
     assert (
-        abs(np.diff(predict_depth(code, time, instant, 1.0, 1.0, 0.0))[0]) < 2.1e-9 * 0.785
+        abs(np.diff(predict_depth(code, time, instant, Instrument(), 0.0))[0]) < 2.1e-9 * 0.785
     )  # 2 ns of motion
     grid = np.linspace(0, 7e-3, 50)
-    plain = predict_depth(code, grid, instant, 1.0, 1.0, 0.0)
-    assert predict_depth(code, grid, instant, 1.25, 1.0, 0.0) == pytest.approx(plain / 1.25, rel=1e-12)
-    assert predict_depth(code, grid * 0.8, instant, 1.0, 0.8, 0.0) == pytest.approx(
+    plain = predict_depth(code, grid, instant, Instrument(), 0.0)
+    assert predict_depth(code, grid, instant, Instrument(pixel_factor=1.25), 0.0) == pytest.approx(
+        plain / 1.25, rel=1e-12
+    )
+    assert predict_depth(code, grid * 0.8, instant, Instrument(rate_factor=0.8), 0.0) == pytest.approx(
         plain, rel=1e-9, abs=1e-12
     )
     step = 1e-7
-    later = predict_depth(code, grid, instant._replace(contact_time=5e-3 + step), 1.0, 1.0, 0.0)
-    speed = predict_speed(code, grid, instant, 1.0, 1.0)
+    later = predict_depth(code, grid, instant._replace(contact_time=5e-3 + step), Instrument(), 0.0)
+    speed = predict_speed(code, grid, instant, Instrument())
     inside = np.abs(grid - 5e-3) > 1e-5
     assert ((plain - later) / step)[inside] == pytest.approx(speed[inside], rel=1e-3, abs=1e-4)
+
+
+def test_rows_that_are_read_one_after_another_show_a_later_tip():
+    """Where it was when its row was read; and frames that come ever later show it ever further on its way."""
+    code, instant = sine_code(), Instant(5e-3, math.log(0.785), 0.0)
+    grid = np.linspace(0, 7e-3, 50)
+    seen = predict_depth(code, grid, instant, Instrument(row_delay=0.3), 0.0)
+    assert seen == pytest.approx(predict_depth(code, grid + 0.3 * seen, instant, Instrument(), 0.0), abs=2e-7)
+    later = predict_depth(code, grid, instant, Instrument(clock_drift=20.0), 0.0)
+    clock = grid - 5e-3
+    assert later == pytest.approx(
+        predict_depth(code, grid + 10.0 * clock**2, instant, Instrument(), 0.0), abs=1e-12
+    )
 
 
 def test_effects_add_a_polynomial_that_vanishes_at_null():
@@ -165,7 +180,7 @@ def synthetic_track(drop, rng, outliers=()):
     camera = drop.camera
     code, contact, speed = sine_code(), 0.0081, 0.785
     time = np.arange(110) / camera.frame_rate
-    depth = predict_depth(code, time, Instant(contact, math.log(speed), 0.0), 1.0, 1.0, 0.0)
+    depth = predict_depth(code, time, Instant(contact, math.log(speed), 0.0), Instrument(), 0.0)
     row = camera.surface_row + depth / camera.pixel_size + 0.08 * rng.standard_normal(time.size)
     for k in outliers:
         row[k] += 4.0
@@ -245,7 +260,7 @@ def test_sampler_recovers_a_known_gaussian_and_goes_on_after_a_stop(tmp_path):
 
 def test_free_fall_has_its_own_gravity():
     instant = Instant(0.0, math.log(0.5), 0.0)
-    early = predict_depth(sine_code(), np.array([-1e-3]), instant, 1.0, 1.0, 0.0)[0]
+    early = predict_depth(sine_code(), np.array([-1e-3]), instant, Instrument(), 0.0)[0]
     assert early == pytest.approx(-0.5e-3 + 0.5 * STANDARD_GRAVITY * 1e-6, rel=1e-9)
 
 

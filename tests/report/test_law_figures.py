@@ -7,14 +7,13 @@ import pytest
 
 from labsim.diagnosis.unlisted.free_law import RecoveredLaw
 from labsim.diagnosis.unlisted.hats import FreeLaw
+from labsim.effects.law_places import LAW_PLACES
 from labsim.effects.terms import list_terms
 from labsim.report.figures.laws import draw_laws, plot_law, trace_law
 
-SPEED = FreeLaw("force of speed", "speed", "m/s", (0.0, 0.3, 1.2), (0.3, 1.2), (0.0, 1.0), "Pa", 400.0)
+SPEED = FreeLaw(LAW_PLACES["force of speed"], (0.0, 0.3, 1.2), (0.3, 1.2), (0.0, 1.0))
 DUST = (0.18, 0.21, 0.25)
-STRENGTH = FreeLaw(
-    "strength of filling factor", "filling factor", "1", DUST, DUST, (DUST[0], DUST[-1]), "1", 1.0
-)
+STRENGTH = FreeLaw(LAW_PLACES["strength of filling factor"], DUST, DUST, (DUST[0], DUST[-1]))
 LAWS = tuple(RecoveredLaw(law, np.zeros(len(law.knots)), np.eye(len(law.knots))) for law in (SPEED, STRENGTH))
 
 

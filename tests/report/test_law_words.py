@@ -9,13 +9,12 @@ from labsim.diagnosis.judge import Verdict
 from labsim.diagnosis.misfit import Part
 from labsim.diagnosis.unlisted.free_law import RecoveredLaw
 from labsim.diagnosis.unlisted.hats import FreeLaw
+from labsim.effects.law_places import LAW_PLACES
 from labsim.report.campaign_tables import say_verdict
 from labsim.report.pages.law_words import say_missing, size_of_missing
 
-DEPTH = FreeLaw(
-    "force of depth", "depth", "tip radii", (0.0, 1.0, 2.0), (0.0, 1.0, 2.0), (0.0, 2.0), "Pa", 400.0
-)
-SPEED = FreeLaw("force of speed", "speed", "m/s", (0.0, 0.3, 1.2), (0.3, 1.2), (0.0, 1.0), "Pa", 400.0)
+DEPTH = FreeLaw(LAW_PLACES["force of depth"], (0.0, 1.0, 2.0), (0.0, 1.0, 2.0), (0.0, 2.0))
+SPEED = FreeLaw(LAW_PLACES["force of speed"], (0.0, 0.3, 1.2), (0.3, 1.2), (0.0, 1.0))
 
 
 def a_law(law: FreeLaw, mean: list[float], sigma: float) -> RecoveredLaw:

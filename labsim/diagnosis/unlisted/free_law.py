@@ -28,7 +28,7 @@ from ...inference.workbench import Workbench
 from ...records import FloatArray
 from ...runs.parts import Push
 from ..screen import has_runs
-from .hats import FreeLaw, list_laws, make_hats
+from .hats import FreeLaw, list_applicable, list_laws, make_effect, make_hats
 
 AHEAD = 10.0  # so much, in ln evidence, before a law that has no place in the equations
 # of the unit. A law of 3 to 24 % all along the way moves depths by 1 to 8 %; one hat is a fourth of the way
@@ -69,8 +69,9 @@ class RecoveredLaw:
 
 @dataclass(frozen=True)
 class Tangents:
-    """Whitened products of all data about a law. names : ln_p_m, then hats; gram : (2 + k, 2 + k) with the residual of no law
-    first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude; log_p_m : there."""
+    """Whitened products of all data about a law. names : ln_p_m, hats, terms that need no runs; gram : (2 + k, 2 + k), the
+    residual of no law first; log_determinant of the covariance; drops : (n, k) tangents of the drops, m per unit amplitude;
+    log_p_m : there."""
 
     laws: tuple[FreeLaw, ...]
     names: tuple[str, ...]
@@ -128,6 +129,10 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
     free.require_changes([(name, hat.amplitudes[0].step, index) for name, hat in hats.items()], "free law")
     names = [name for name in hats if has_runs(bench, name)]
     scales = {hat: law.scale for law in laws for hat in law.hats}
+    formulas, units = list_applicable(bench, ())  # those that need no runs
+    free.effects.update({name: make_effect(term, units[name]) for name, term in formulas.items()})
+    scales |= units
+    names += formulas
     kept = tuple(
         replace(law, knots=tuple(knot for knot, hat in zip(law.knots, law.hats, strict=True) if hat in names))
         for law in laws

@@ -1,56 +1,57 @@
-"""Hats: the pieces that a law left free in the equations is made of, each a change of the setting like an effect's.
+"""Hats and terms as effects: a hat is a piece of a law left free in the equations, a term a formula in its place.
 
-They never stand in the catalogue. What fits them: free_law.py; equations: docs/free-law.md.
+They never stand in the catalogue. What fits them: free_law.py, learned_law.py; equations: docs/free-law.md, docs/learned-law.md.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from ...effects import Effect, Normal, Parameter
+import numpy as np
+
+from ...effects import Effect, Instrument, Normal, Parameter
 from ...effects.contract import ChangeSetting
-from ...effects.terms import Knots, add_table
-from ...inference.fits.fitting import Fit
+from ...effects.law_places import LAW_PLACES, Knots, LawPlace
+from ...effects.terms import KNOTS, Term, add_term, list_terms, see_term
+from ...inference.fits.fitting import Fit, fit_hypothesis
 from ...inference.observations.compacted_zone import CompactedZones
+from ...inference.observations.drop_model import DropModel
 from ...inference.observations.tracks import Tracks
 from ...inference.workbench import Workbench
-from ...records import Campaign
+from ...records import Campaign, FloatArray
 from ...sph import DropSetting
 
-PRESSURE = 400.0  # Pa, what stops a drop of 0.65 m/s by the published 625 Pa s/m: the unit of the forces
-MASS = 0.3  # of the projectile's mass, that sticks to it: the unit
 STEP = 0.3  # of a hat when it is simulated
+USUAL = 0.4  # of a law's scale: standard deviation of a coefficient's prior where its term is largest
 FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
-COMPACTION = (
-    0.0,
-    0.03,
-    0.07,
-    0.13,
-)  # above φ0: half of what a tip compacts ends below 0.03, nine tenths below 0.07
-DEPTHS = (0.0, 0.5, 1.0, 2.0, 4.0)  # tip radii
-# tip radii, enough for the terms; a mass that goes up and down again would be any force of depth
-MASS_DEPTHS = (0.0, 1.0, 4.0)
-SPEEDS = (0.1, 0.3, 0.6, 1.2)  # m/s; nought at rest: a force that does not change with speed is one of depth
 
 
 @dataclass(frozen=True)
 class FreeLaw:
-    """One place in the equations. grid : all knots; knots : those that hats stand at, the law is nought at the others; unit : of
-    the knots; reach : between what of them the data speak; scale : of a coefficient, in value_unit."""
+    """A law at one place in the equations. grid : all knots; knots : those that hats stand at, the law is nought at the others;
+    reach : between what of them the data speak."""
 
-    name: str
-    over: str
-    unit: str
+    place: LawPlace
     grid: tuple[float, ...]
     knots: tuple[float, ...]
     reach: tuple[float, float]
-    value_unit: str
-    scale: float
+
+    @property
+    def name(self) -> str:
+        return self.place.name
+
+    @property
+    def over(self) -> str:
+        return self.place.over
+
+    @property
+    def scale(self) -> float:
+        return self.place.scale
 
     def hat(self, k: int) -> str:
         return f"{self.name} at {self.knots[k]:g}"
@@ -61,7 +62,7 @@ class FreeLaw:
 
 
 def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
-    """The four laws with the hats that these drops and scans reach."""
+    """The laws that are simulated, with the hats that these drops and scans reach."""
     deepest, fastest = 0.0, 0.0
     for observation, nuisances in zip(bench.observations, fit.nuisances, strict=True):
         if isinstance(observation, Tracks):
@@ -73,22 +74,18 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
             observed = [zone.observed for zone in observation.zones]
             deepest = max([deepest, *(each.reduced.map.tip_depth / each.radius for each in observed)])
             fastest = max(fastest, math.exp(float(nuisances.max())))
-    material, level = bench.campaign.material, bench.campaign.sample.filling_factor
-    dust = tuple(round(level + more, 6) for more in COMPACTION if level + more < material.phi_2)
-    at_rest = (0.0, *SPEEDS)
-    return (
-        FreeLaw("strength of filling factor", "filling factor", "1", dust, dust, (dust[0], dust[-1]), "1", 1.0),
-        FreeLaw(
-            "force of depth", "depth", "tip radii", DEPTHS, _reached(DEPTHS, deepest), (0.0, deepest), "Pa", PRESSURE
-        ),
-        FreeLaw(
-            "force of speed", "speed", "m/s", at_rest, _reached(at_rest, fastest)[1:], (0.0, fastest), "Pa", PRESSURE
-        ),
-        FreeLaw(
-            "mass of depth", "depth", "tip radii", MASS_DEPTHS, _reached(MASS_DEPTHS, deepest)[1:], (0.0, deepest),
-            "1", MASS,
-        ),
-    )  # fmt: skip
+    laws = []
+    for place in LAW_PLACES.values():
+        if place.over == "filling factor":
+            level, most = bench.campaign.sample.filling_factor, bench.campaign.material.phi_2
+            dust = tuple(round(level + more, 6) for more in place.knots if level + more < most)
+            laws.append(FreeLaw(place, dust, dust, (dust[0], dust[-1])))
+        elif place.simulated:
+            most = {"depth": deepest, "speed": fastest}[place.over]
+            # nought where nothing has moved: a force that does not change with speed is one of depth
+            reached = _reached(place.knots, most)[int(place.least == 0.0) :]
+            laws.append(FreeLaw(place, place.knots, reached, (0.0, most)))
+    return tuple(laws)
 
 
 def _reached(knots: Sequence[float], most: float) -> tuple[float, ...]:
@@ -97,7 +94,7 @@ def _reached(knots: Sequence[float], most: float) -> tuple[float, ...]:
 
 
 def make_hats(law: FreeLaw, deepest: Mapping[DropSetting, float] | None = None) -> dict[str, Effect]:
-    """Every hat of a law as an effect with one amplitude, in the law's value_unit: null changes nothing, bit for bit.
+    """Every hat of a law as an effect with one amplitude, in the unit of its values: null changes nothing, bit for bit.
 
     deepest : depth (m) of drops without a law; a force that such a drop does not meet leaves its setting, so no run is made.
     """
@@ -105,10 +102,10 @@ def make_hats(law: FreeLaw, deepest: Mapping[DropSetting, float] | None = None) 
     for name, knot in zip(law.hats, law.knots, strict=True):
         unit = tuple((place, 1.0 if place == knot else 0.0) for place in law.grid)
         step = STEP * law.scale
-        lowest = -0.9 if law.over == "filling factor" else -1e5
-        parameter = Parameter(
-            "amplitude", law.value_unit, 0.0, (lowest, 1e5), Normal(0.0, law.scale), step, "of one hat"
-        )
+        # a force along the motion is for the fit to ask for; a strength that is left is for the simulation
+        lowest = law.place.least if law.over == "filling factor" else -1e5
+        unit_name, prior = law.place.value_unit, Normal(0.0, law.scale)
+        parameter = Parameter("amplitude", unit_name, 0.0, (lowest, 1e5), prior, step, "of one hat")
         hats[name] = Effect(
             name, name, "material", (parameter,), "", (), {}, Path(__file__), lambda campaign: "",
             _add(law, unit, knot, deepest or {}), None, partial(_give, (parameter,)),
@@ -130,12 +127,74 @@ def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, f
         }
         if reached[law.over] <= begins:
             return setting
-        null = 1.0 if law.over == "filling factor" else 0.0
-        return add_table(setting, law.name, tuple((knot, null + amplitude * height) for knot, height in unit))
+        assert law.place.add is not None
+        return law.place.add(setting, tuple((knot, amplitude * height) for knot, height in unit))
 
     return change
 
 
+def list_applicable(bench: Workbench, laws: Sequence[FreeLaw]) -> tuple[dict[str, Term], dict[str, float]]:
+    """Terms that may be at work here, and of each the coefficient that changes as much as the law's scale where it is largest.
+
+    laws : whose hats have runs. Not those that a cause of that name stands for, or which the data do not reach.
+    """
+    places = {law.name: law for law in laws if law.knots}
+    radii = np.unique([1e3 * family.projectile.tip_radius for family in bench.families])
+    terms, units = {}, {}
+    for name, term in list_terms().items():
+        if name in bench.effects:
+            continue
+        if term.place in places:
+            largest = find_peak(term, places[term.place])
+        elif term.acts.over == "radius of the tip" and len(radii) > 1:
+            largest = 0.5 * float(np.ptp(term.shape(radii)))  # what all tips have in common is p_m
+        elif term.acts.see and any(isinstance(model, DropModel) for model in bench.tracks.models):
+            largest = 1.0
+        else:
+            continue
+        if largest > 0.0:
+            terms[name], units[name] = term, term.acts.scale / largest
+    return terms, units
+
+
+def find_peak(term: Term, law: FreeLaw) -> float:
+    """The largest value of a term's shape between what the data reach, which may lie between knots or before the last."""
+    return float(np.max(np.abs(shape_at(term, law, np.linspace(*law.reach, KNOTS)))))
+
+
+def fit_without_runs(bench: Workbench, nominal: Fit) -> dict[str, Fit]:
+    """Every term that costs no runs, fitted: of the strength by the tip's radius, of the camera's clock."""
+    terms, units = list_applicable(bench, ())
+    free = replace(bench, effects={**bench.effects, **{n: make_effect(terms[n], units[n]) for n in terms}})
+    return {name: fit_hypothesis(free, (name,), (nominal.log_p_m, {}), nuisances=nominal) for name in terms}
+
+
+def shape_at(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:
+    """A term at places of a law; it takes compaction where the law goes with the filling factor."""
+    return term.shape(places - law.grid[0] if law.over == "filling factor" else places)
+
+
+def make_effect(term: Term, unit: float) -> Effect:
+    """A term as an effect of one campaign. unit : coefficient that changes as much as the free law's unit where it is largest."""
+    low, high = (min(max(limit, -1e9), 1e9) for limit in term.limits)
+    parameter = Parameter(
+        "coefficient", term.unit, 0.0, (low, high), Normal(0.0, USUAL * unit), STEP * unit, "of the free law's unit"
+    )  # fmt: skip
+
+    def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:
+        return add_term(setting, term, values["coefficient"])
+
+    def see(instrument: Instrument, values: Mapping[str, float], place: object) -> Instrument:
+        return see_term(instrument, term, values["coefficient"])
+
+    of_camera = term.acts.see is not None
+    return Effect(
+        term.name, term.title, "measurement" if of_camera else "material", (parameter,), "", (term.source,), {},
+        Path(__file__), lambda campaign: "", None if of_camera else change, see if of_camera else None,
+        partial(_give, (parameter,)),
+    )  # fmt: skip
+
+
 def _give(parameters: tuple[Parameter, ...], campaign: Campaign) -> tuple[Parameter, ...]:
-    """The parameters of one hat, the same in every campaign."""
+    """The parameters of one hat or term, the same in every campaign."""
     return parameters

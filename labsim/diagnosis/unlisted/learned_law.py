@@ -11,27 +11,23 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 
-from ...effects import Effect, Normal, Parameter
-from ...effects.terms import KNOTS, Term, add_term, list_terms
+from ...effects.terms import KNOTS, Term
 from ...errors import LabsimError
-from ...inference.fits.fitting import Fit, fit_hypothesis
+from ...inference.fits.fitting import Fit, Hypothesis, fit_hypothesis
 from ...inference.fits.settle import list_large, settle
 from ...inference.workbench import Workbench
-from ...records import Campaign, FloatArray
-from ...sph import DropSetting
+from ...records import FloatArray
+from ..explore import FACTORS, fit_from_strengths
 from ..gain import Gain, HeldOut, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import SIZES, Marginal, Tangents, integrate
-from .hats import STEP, FreeLaw
+from .hats import FreeLaw, list_applicable, make_effect, shape_at
 from .unknown import log_mean
 
-USUAL = 0.4  # of a law's unit: standard deviation of a coefficient's prior where its term is largest, the middle of SIZES
 MOST_SIMULATED = 4  # formulas, beside the best of every place
 MOST_SETTLED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
@@ -78,26 +74,24 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
 
     before : the nominal model's predictions of held-out drops.
     """
-    laws = {law.name: law for law in tangents.laws if law.knots}
-    # an effect of that name has been tried as a cause
-    terms = {n: term for n, term in list_terms().items() if term.place in laws and n not in bench.effects}
-    peaks = {name: find_peak(term, laws[term.place]) for name, term in terms.items()}
-    terms = {name: term for name, term in terms.items() if peaks[name] > 0}
-    effects = {name: make_effect(term, laws[term.place].scale / peaks[name]) for name, term in terms.items()}
-    free = replace(bench, effects={**bench.effects, **effects})
+    terms, units = list_applicable(bench, tangents.laws)
+    free = replace(bench, effects={**bench.effects, **{n: make_effect(terms[n], units[n]) for n in terms}})
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
+    afar: dict[Hypothesis, Fit | None] = {}
+    for names, _ in chosen:  # before there are finer runs, which coarse ones do not stand beside
+        top = max([nominal.evidence, *(fit.evidence for fit in afar.values() if fit)])
+        with suppress(LabsimError):
+            afar[names] = fit_from_strengths(free, nominal, names, top, FACTORS[1:])
     fits = []
-    for names, marginal in choose_formulas(weigh_formulas(tangents, terms, peaks, (low, high)), terms):
-        units = [laws[terms[name].place].scale / peaks[name] for name in names]
-        values = {
-            name: float(c) * unit
-            for name, c, unit in zip(names, marginal.coefficients[1:], units, strict=True)
-        }
-        start = tangents.log_p_m + float(marginal.coefficients[0])
-        try:
-            fits.append(fit_hypothesis(free, names, (start, values), nuisances=nominal))
-        except LabsimError:
-            continue  # its runs fail: no formula for this dust
+    for names, marginal in chosen:
+        more, *shares = (float(each) for each in marginal.coefficients)
+        values = {name: share * units[name] for name, share in zip(names, shares, strict=True)}
+        found = _fit(free, names, (tangents.log_p_m + more, values), nominal)
+        far = afar.get(names)
+        if far is not None and far.evidence > max([nominal.evidence, *(fit.evidence for fit in found)]):
+            found += _fit(free, names, (far.log_p_m, far.values), far)
+        fits += sorted(found, key=lambda fit: -fit.evidence)[:1]
     fits.sort(key=lambda fit: -fit.evidence)
     for k, fit in enumerate(fits[:MOST_SETTLED]):
         if list_large(free, fit):
@@ -115,9 +109,18 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     return LearnedLaw(tuple(sorted(formulas, key=lambda each: -each.fit.evidence)), free)
 
 
+def _fit(
+    bench: Workbench, names: Hypothesis, start: tuple[float, Mapping[str, float]], known: Fit
+) -> list[Fit]:
+    """A formula fitted; none where its runs fail: it is no formula for this dust."""
+    with suppress(LabsimError):
+        return [fit_hypothesis(bench, names, start, nuisances=known)]
+    return []
+
+
 def choose_formulas(
-    weighed: Sequence[tuple[tuple[str, ...], Marginal]], terms: Mapping[str, Term]
-) -> list[tuple[tuple[str, ...], Marginal]]:
+    weighed: Sequence[tuple[Hypothesis, Marginal]], terms: Mapping[str, Term]
+) -> list[tuple[Hypothesis, Marginal]]:
     """Those to simulate, best first: the first MOST_SIMULATED, and the best single term of every other place. What is weighed is
     linear about a p_m that may be far from the truth's, where a term of the right place stands behind pairs of wrong ones."""
     chosen = list(weighed[:MOST_SIMULATED])
@@ -129,11 +132,6 @@ def choose_formulas(
     return chosen
 
 
-def find_peak(term: Term, law: FreeLaw) -> float:
-    """The largest value of a term's shape between what the data reach, which may lie between knots or before the last."""
-    return float(np.max(np.abs(shape_at(term, law, np.linspace(*law.reach, KNOTS)))))
-
-
 def share_hats(term: Term, law: FreeLaw) -> FloatArray:
     """Heights of the law's hats whose sum is nearest to the term. Its values at the knots are not: a film between two is lost."""
     places = np.linspace(law.grid[0], max(law.knots), KNOTS)
@@ -142,23 +140,20 @@ def share_hats(term: Term, law: FreeLaw) -> FloatArray:
     return heights
 
 
-def shape_at(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:
-    """A term at places of a law; it takes compaction where the law goes with the filling factor."""
-    return term.shape(places - law.grid[0] if law.over == "filling factor" else places)
-
-
 def weigh_formulas(
-    tangents: Tangents, terms: Mapping[str, Term], peaks: Mapping[str, float], limits: tuple[float, float]
-) -> list[tuple[tuple[str, ...], Marginal]]:
+    tangents: Tangents, terms: Mapping[str, Term], units: Mapping[str, float], limits: tuple[float, float]
+) -> list[tuple[Hypothesis, Marginal]]:
     """Terms by themselves and in pairs, those with most evidence first; a pair only where it promises LEAST_GAIN over its better
-    part, and over nothing. Coefficients are in units of the law where the term is largest; one on the wrong side of a limit is
-    refused."""
+    part, and over nothing. Coefficients are over ``units``; one on the wrong side of a limit is refused."""
     laws = {law.name: law for law in tangents.laws}
     columns = np.zeros((len(tangents.gram), 2 + len(terms)))
     columns[0, 0] = columns[1, 1] = 1.0
     for k, (name, term) in enumerate(terms.items(), start=2):
+        if not term.acts.simulated:
+            columns[tangents.names.index(name) + 1, k] = 1.0
+            continue
         law = laws[term.place]
-        for hat, share in zip(law.hats, share_hats(term, law) / peaks[name], strict=True):
+        for hat, share in zip(law.hats, share_hats(term, law) * units[name] / law.scale, strict=True):
             columns[tangents.names.index(hat) + 1, k] = share
     gram = columns.T @ tangents.gram @ columns
     reduced = replace(tangents, names=("ln_p_m", *terms), gram=gram)
@@ -172,7 +167,7 @@ def weigh_formulas(
         return all(terms[name].limits[0] < 0.0 if c < 0 else terms[name].limits[1] > 0.0 for name, c in signs)
 
     nothing, _ = weigh(())
-    weighed: dict[tuple[str, ...], tuple[float, Marginal]] = {}
+    weighed: dict[Hypothesis, tuple[float, Marginal]] = {}
     for names in [(name,) for name in terms] + list(combinations(terms, 2)):
         evidence, marginal = weigh(names)
         parts = [weighed[part,][0] for part in names if (part,) in weighed]
@@ -180,24 +175,3 @@ def weigh_formulas(
             weighed[names] = evidence, marginal
     ranked = sorted(weighed, key=lambda names: -weighed[names][0])
     return [(names, weighed[names][1]) for names in ranked]
-
-
-def make_effect(term: Term, unit: float) -> Effect:
-    """A term as an effect of one campaign. unit : coefficient that changes as much as the free law's unit where it is largest."""
-    low, high = (min(max(limit, -1e9), 1e9) for limit in term.limits)
-    parameter = Parameter(
-        "coefficient", term.unit, 0.0, (low, high), Normal(0.0, USUAL * unit), STEP * unit, "of the free law's unit"
-    )  # fmt: skip
-
-    def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:
-        return add_term(setting, term, values["coefficient"])
-
-    return Effect(
-        term.name, term.title, "material", (parameter,), "", (term.source,), {}, Path(__file__), lambda campaign: "",
-        change, None, partial(_give, (parameter,)),
-    )  # fmt: skip
-
-
-def _give(parameters: tuple[Parameter, ...], campaign: Campaign) -> tuple[Parameter, ...]:
-    """The parameters of one term, the same in every campaign."""
-    return parameters

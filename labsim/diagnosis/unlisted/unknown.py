@@ -2,8 +2,9 @@
 
 It competes with the causes on equal terms: residuals are a Gaussian process, orthogonal to nothing, whose size is
 integrated over a few values. What may deviate stands in FREEDOMS: a force law smooth over the way into the dust, speed and size;
-every drop by its own offset; the layering of undisturbed dust. Where the nominal model fails, laws that stand in the equations of
-motion compete too (EMBEDDED, free_law.py): what they find is drawn as the shape of what is missing.
+every drop by its own offset; the layering of undisturbed dust. Where the nominal model may fail, formulas that cost no runs
+compete too, together as one freedom; where it fails, laws that stand in the equations of motion (EMBEDDED, free_law.py): what
+these find is drawn as the shape of what is missing.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...effects.terms import list_terms
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import log_share_inside
-from ...inference.fits.fitting import Fit
+from ...inference.fits.fitting import DOUBTFUL, Fit, goodness_of_fit
 from ...inference.workbench import Workbench
 from ...records import FloatArray
 from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
 from .free_law import SIZES as LAW_SIZES
+from .hats import fit_without_runs
 
 SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth
 MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map, or the undisturbed dust, by 3 %
@@ -94,6 +97,12 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
             if best is None or evidence > best[0]:
                 law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(drops.residual.size)
                 best = (evidence, name, size, law)
+    formulas = fit_without_runs(bench, fit) if goodness_of_fit(fit) < DOUBTFUL else {}
+    if formulas:
+        term, found = max(formulas.items(), key=lambda item: item[1].evidence)
+        terms[list_terms()[term].title] = [each.evidence for each in formulas.values()]
+        if best is None or found.evidence > best[0]:
+            best = (found.evidence, list_terms()[term].title, 0.0, drops.residual - found.drops.residual)
     embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
     for name, places in EMBEDDED.items():
         if tangents is None:

@@ -18,4 +18,12 @@ TERMS = (
         "stuck_cap", "a cap of dust that sticks to the tip in its first radius", PLACE, "1", "z/a, at most 1",
         lambda z: np.minimum(z, 1.0), "The cone of dense grains under a blunt tip: Aguilar & Goldman (2016)",
     ),
+    Term(
+        "stuck_root", "dust that sticks to the tip, most of it early", PLACE, "1", "√(z/a)",
+        lambda z: np.sqrt(z), "A cone of dense grains that is nearly whole after a radius: Aguilar & Goldman (2016)",
+    ),
+    Term(
+        "stuck_late", "dust that sticks to the tip, ever more with depth", PLACE, "1", "(z/a)²",
+        lambda z: z**2, "A cone of dense grains that widens as it grows",
+    ),
 )  # fmt: skip

@@ -13,11 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import Parameter
+from ...effects import Instrument, Parameter
 from ...errors import ExtrapolationError
 from ...records import STANDARD_GRAVITY, FloatArray
 from .curves import decode_depth, decode_rate
 from .grid import STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
+
+EXPOSED = 8  # times that an instant is put right by the tip's depth: each leaves speed times delay of the last change
 
 Changes = dict[float, dict[float, FloatArray]]
 
@@ -125,26 +127,32 @@ class Instant(NamedTuple):
 
 
 def predict_depth(
-    code: FloatArray,
-    time: FloatArray,
-    instant: Instant,
-    pixel_factor: float,
-    rate_factor: float,
-    offset: float,
+    code: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument, offset: float
 ) -> FloatArray:
     """Stated depth (m) at stated times (s). offset: row offset of the surface, m on the stated scale."""
-    clock = time / rate_factor - instant.contact_time
-    speed = math.exp(instant.log_speed)
-    fall = clock * (speed + 0.5 * STANDARD_GRAVITY * clock)
-    depth = np.where(clock < 0.0, fall, decode_depth(code, np.maximum(clock, 0.0)))
-    return depth / pixel_factor + offset + instant.surface
+    depth = _fall(code, _read_clock(code, time, instant, instrument), instant)
+    return depth / instrument.pixel_factor + offset + instant.surface
 
 
-def predict_speed(
-    code: FloatArray, time: FloatArray, instant: Instant, pixel_factor: float, rate_factor: float
-) -> FloatArray:
+def predict_speed(code: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument) -> FloatArray:
     """Stated speed (m/s), derivative of predict_depth with respect to minus the contact time."""
-    clock = time / rate_factor - instant.contact_time
+    clock = _read_clock(code, time, instant, instrument)
     speed = math.exp(instant.log_speed)
     rate = np.where(clock < 0.0, speed + STANDARD_GRAVITY * clock, decode_rate(code, np.maximum(clock, 0.0)))
-    return rate / pixel_factor
+    return rate / instrument.pixel_factor
+
+
+def _read_clock(code: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument) -> FloatArray:
+    """True times from contact (s) at which the tip was seen where frames of these stated times (s) show it."""
+    clock = instrument.true_time(time) - instant.contact_time
+    clock = clock * (1.0 + 0.5 * instrument.clock_drift * clock)
+    exposed = clock
+    for _ in range(EXPOSED if instrument.row_delay else 0):  # where it is says when its row is read
+        exposed = clock + instrument.row_delay * _fall(code, exposed, instant)
+    return exposed
+
+
+def _fall(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
+    """True depth (m) at true times from contact (s)."""
+    fall = clock * (math.exp(instant.log_speed) + 0.5 * STANDARD_GRAVITY * clock)
+    return np.where(clock < 0.0, fall, decode_depth(code, np.maximum(clock, 0.0)))

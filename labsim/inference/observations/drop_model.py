@@ -52,15 +52,11 @@ class DropModel:
     def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Stated depth (m) at the compared points, (points,), of an encoded curve."""
         offset = instrument.row_offset_px * self.observed.pixel
-        return self.matrix @ predict_depth(
-            code, self.observed.time, instant, instrument.pixel_factor, instrument.rate_factor, offset
-        )
+        return self.matrix @ predict_depth(code, self.observed.time, instant, instrument, offset)
 
     def predict_speed(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Stated speed (m/s) at the compared points, (points,), of an encoded curve."""
-        return self.matrix @ predict_speed(
-            code, self.observed.time, instant, instrument.pixel_factor, instrument.rate_factor
-        )
+        return self.matrix @ predict_speed(code, self.observed.time, instant, instrument)
 
     @property
     def data(self) -> FloatArray:
@@ -142,7 +138,7 @@ class DropModel:
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         """True times (s) of the data."""
-        return self.matrix @ (self.observed.time / instrument.rate_factor)
+        return self.matrix @ (instrument.true_time(self.observed.time))
 
     def move(self, before: Instant, best: FloatArray, widths: tuple[float, float]) -> tuple[Instant, float]:
         """Nuisances after the best step (contact time, ln speed, surface row; in prior widths), and how far that was.

@@ -142,7 +142,7 @@ def _film(
     row_error = laboratory.surfaces * camera.surface_row_sigma * rng.standard_normal()
     instant = Instant(contact, math.log(speed), row_error * camera.pixel_size)
     offset = instrument.row_offset_px * camera.pixel_size
-    depth = predict_depth(code, time, instant, instrument.pixel_factor, instrument.rate_factor, offset)
+    depth = predict_depth(code, time, instant, instrument, offset)
     sigma = drop.record.row_sigma or 0.08
     row = camera.surface_row + depth / camera.pixel_size
     row = row + laboratory.rows * sigma * rng.standard_normal(frames.size)

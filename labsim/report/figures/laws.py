@@ -10,7 +10,6 @@ import numpy as np
 from ...diagnosis.unlisted.free_law import RecoveredLaw
 from ...diagnosis.unlisted.learned_law import Formula, shape_at
 from ...records import FloatArray
-from ..pages.law_words import place_label, value_label
 from .interactive import MARGIN, Spec
 from .look import BLUE, INK, ORANGE, new_figure
 
@@ -24,7 +23,7 @@ def trace_law(law: RecoveredLaw) -> tuple[FloatArray, FloatArray, FloatArray]:
         np.concatenate([np.linspace(low, high, POINTS), [k for k in law.law.grid if low <= k <= high]])
     )
     mean, sigma = law.at(place)
-    factor = 100.0 if law.law.over == "filling factor" else 1.0
+    factor = law.law.place.factor
     return place, factor * mean, factor * sigma
 
 
@@ -32,7 +31,7 @@ def trace_formula(law: RecoveredLaw, formula: Formula | None, place: FloatArray)
     """What a formula adds at this place in the equations, as it is shown; None where it adds nothing there."""
     if formula is None:
         return None
-    factor = 100.0 if law.law.over == "filling factor" else 1.0
+    factor = law.law.place.factor
     own = [
         factor * c * shape_at(term, law.law, place)
         for term, c in zip(formula.terms, formula.coefficients, strict=True)
@@ -55,8 +54,9 @@ def draw_laws(laws: Sequence[RecoveredLaw], path: Path, formula: Formula | None 
             if learned is not None:
                 ax.plot(place, learned, "--", color=ORANGE, label="formula")
                 ax.legend(frameon=False)
-            ax.set_xlabel(place_label(law))
-            ax.set_ylabel(value_label(law))
+            along, up = law.law.place.axes
+            ax.set_xlabel(along)
+            ax.set_ylabel(up)
     return path
 
 
@@ -84,12 +84,13 @@ def plot_law(law: RecoveredLaw, formula: Formula | None = None) -> Spec:
                 "line": {"width": 1.8, "dash": "dash"}, "hovertemplate": f"%{{y:{digits}}}",
             }
         )  # fmt: skip
+    along, up = law.law.place.axes
     layout = {
         "height": 280,
         "margin": MARGIN | {"t": 8},
         "showlegend": False,
         "hovermode": "x unified",
-        "xaxis": {"title": {"text": place_label(law)}, "zeroline": False, "hoverformat": ".3g"},
-        "yaxis": {"title": {"text": value_label(law)}, "zeroline": True},
+        "xaxis": {"title": {"text": along}, "zeroline": False, "hoverformat": ".3g"},
+        "yaxis": {"title": {"text": up}, "zeroline": True},
     }
     return {"data": data, "layout": layout}

@@ -211,7 +211,7 @@ def predict_drop(
     offset = instrument.row_offset_px * model.observed.pixel
     offset += contact * model.radius
     time = model.observed.time
-    return predict_depth(code, time, instant, instrument.pixel_factor, instrument.rate_factor, offset)
+    return predict_depth(code, time, instant, instrument, offset)
 
 
 def contact_offset(bench: Workbench, fit: Fit) -> float:

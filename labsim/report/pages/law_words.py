@@ -20,12 +20,6 @@ MISSING = {
     "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
     "speed, about {size} % of the depth",
 }
-PLACE_WORDS = {
-    "strength of filling factor": "a compressive strength that is more than p_m gives by a share of",
-    "force of depth": "a force upwards on the tip, over its cross-section, of",
-    "force of speed": "a force against the motion, over the tip's cross-section, of",
-    "mass of depth": "dust that moves with the tip, over the mass of the projectile, of",
-}
 CLEAR = 2.0  # standard deviations from which a further law of several is named
 
 
@@ -43,7 +37,9 @@ def say_missing(found: Diagnosis) -> str:
     if found.learned is not None:
         return f"is like {say_formula(found.learned.best)}"
     if not is_embedded(found):
-        return "looks like " + MISSING[unknown.block].format(size=f"{100 * unknown.size:.0f}")
+        return "looks like " + MISSING.get(unknown.block, unknown.block).format(
+            size=f"{100 * unknown.size:.0f}"
+        )
     first, *rest = _rank(found)
     further = [f"a {law.law.name}" for law in rest if _clearness(law) > CLEAR]
     return f"acts like {say_law(first)}" + (f" (with parts of {' and '.join(further)})" if further else "")
@@ -121,11 +117,11 @@ def describe_unknown(found: Diagnosis) -> dict[str, Any]:
             {
                 "name": each.law.name,
                 "over": each.law.over,
-                "unit": each.law.unit,
+                "unit": each.law.place.unit,
                 "knots": list(each.law.knots),
                 "mean": each.mean.tolist(),
                 "sd": each.sigma.tolist(),
-                "value_unit": each.law.value_unit,
+                "value_unit": each.law.place.value_unit,
             }
             for each in unknown.laws
         ],
@@ -139,7 +135,7 @@ def say_formula(formula: Formula) -> str:
         digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
         unit = "" if term.unit == "1" else f" {term.unit}"
         times = "" if term.formula == "1" else f" × {term.formula}"
-        said.append(f"{PLACE_WORDS[term.place]} ({c:.{digits}f} ± {sigma:.{digits}f}){unit}{times}")
+        said.append(f"{term.acts.words} ({c:.{digits}f} ± {sigma:.{digits}f}){unit}{times}")
     return " and ".join(said)
 
 
@@ -222,7 +218,7 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
             {
                 "figure": f"law{k}",
                 "title": _begin(law.law.name),
-                "text": f"{_begin(value_label(law))} against {place_label(law)}: {points}. The band holds 68 %."
+                "text": f"{_begin(law.law.place.axes[1])} against {law.law.place.axes[0]}: {points}. The band holds 68 %."
                 + (" Dashed: the formula." if law.law.name in drawn else ""),
             }
         )
@@ -239,15 +235,4 @@ def _begin(words: str) -> str:
 
 
 def _show(law: RecoveredLaw, value: float) -> str:
-    return f"{100 * value:.1f}" if law.law.over == "filling factor" else f"{value:.1f}"
-
-
-def value_label(law: RecoveredLaw) -> str:
-    if law.law.over == "filling factor":
-        return "more strength (%)"
-    return {"depth": "force upwards (Pa)", "speed": "force against the motion (Pa)"}[law.law.over]
-
-
-def place_label(law: RecoveredLaw) -> str:
-    unit = "" if law.law.unit == "1" else f" ({law.law.unit})"
-    return {"filling factor": "filling factor", "depth": "depth", "speed": "speed"}[law.law.over] + unit
+    return f"{law.law.place.factor * value:.1f}"

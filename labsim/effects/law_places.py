@@ -1,0 +1,161 @@
+"""Where the equations, or the clock of a camera, have a place for a law that is not in them, one record each.
+
+    m (1 + d(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) exp(f(a))] - A b(z/a) - A c(v)
+
+m is the mass of the projectile, A the cross-section of its tip, a its radius: a force is a pressure, so that one law holds for
+all sizes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..calibrated import read_value, set_value
+from ..sph import DropSetting
+from .contract import Instrument
+
+Knots = tuple[tuple[float, float], ...]
+LEAST = 0.1  # of the strength that p_m gives, which a law must leave
+
+
+@dataclass(frozen=True)
+class LawPlace:
+    """over, unit : what a law goes with there; value_unit, values : what it gives; words : that in front of a formula.
+
+    shown, shown_unit : that at an axis. reach : of what it goes with, as far as drops come. least : smallest value, a smaller one
+    ``breaks`` physics; of a camera's, and most, ends of its coefficients. scale : a usual value. knots : of what it goes with,
+    for a law without a formula. simulated : what it changes is known from runs, or without any. add : to a drop, a table of
+    knots; see : to a camera, a coefficient.
+    """
+
+    name: str
+    over: str
+    unit: str
+    value_unit: str
+    values: str
+    words: str
+    shown: str
+    shown_unit: str
+    reach: float
+    least: float
+    breaks: str
+    scale: float
+    knots: tuple[float, ...]
+    add: Callable[[DropSetting, Knots], DropSetting] | None
+    simulated: bool = True
+    see: Callable[[Instrument, float], Instrument] | None = None
+    most: float = math.inf
+
+    @property
+    def key(self) -> str:
+        """In the table [law] of a model.toml."""
+        return self.name.replace(" ", "_")
+
+    @property
+    def axes(self) -> tuple[str, str]:
+        """What a curve is drawn against, and what it shows."""
+        return _label(self.over, self.unit), _label(self.shown, self.shown_unit)
+
+    @property
+    def factor(self) -> float:
+        """Of values as they are shown."""
+        return 100.0 if self.shown_unit == "%" else 1.0
+
+
+def _label(words: str, unit: str) -> str:
+    return words if unit == "1" else f"{words} ({unit})"
+
+
+def _add_strength(setting: DropSetting, table: Knots) -> DropSetting:
+    """table : filling factor and share of the strength."""
+    factors = tuple((phi, max(1.0 + more, LEAST)) for phi, more in table)
+    return setting.replace(strength_shape=combine(setting.strength_shape, factors, product=True))
+
+
+def _add_pressure_of_depth(setting: DropSetting, table: Knots) -> DropSetting:
+    radius, area = setting.projectile.tip_radius, _section(setting)
+    table = tuple((knot * radius, value * area) for knot, value in table)
+    return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+
+
+def _add_pressure_of_speed(setting: DropSetting, table: Knots) -> DropSetting:
+    area = _section(setting)
+    return setting.replace(
+        force_of_speed=combine(setting.force_of_speed, tuple((knot, value * area) for knot, value in table))
+    )
+
+
+def _add_mass(setting: DropSetting, table: Knots) -> DropSetting:
+    radius, mass = setting.projectile.tip_radius, setting.projectile.mass
+    table = tuple((knot * radius, value * mass) for knot, value in table)
+    return setting.replace(mass_of_depth=combine(setting.mass_of_depth, table))
+
+
+def _add_size(setting: DropSetting, table: Knots) -> DropSetting:
+    more = float(np.interp(1e3 * setting.projectile.tip_radius, *np.asarray(table).T))
+    strength = read_value(setting.material) * math.exp(more)
+    return setting.replace(material=set_value(setting.material, strength)) if more != 0.0 else setting
+
+
+def _section(setting: DropSetting) -> float:
+    radius = setting.projectile.tip_radius
+    return 2 * radius if setting.geometry == "planar" else math.pi * radius**2
+
+
+def combine(before: Knots, table: Knots, *, product: bool = False) -> Knots:
+    """Sum of two laws linear between knots, or their product at the knots of both."""
+    if not before:
+        return table
+    places = sorted({x for x, _ in (*before, *table)})
+    first, second = (np.interp(places, *np.asarray(each).T) for each in (before, table))
+    return tuple(zip(places, (first * second if product else first + second).tolist(), strict=True))
+
+
+# 400 Pa stop a drop of 0.65 m/s by the published 625 Pa s/m. Half of what a tip compacts ends below 0.03 above φ0, nine tenths
+# below 0.07. A mass that goes up and down again would be any force of depth: it has few knots
+LAW_PLACES = {
+    place.name: place
+    for place in (
+        LawPlace(
+            "strength of filling factor", "filling factor", "1", "1", "strength over what p_m gives, minus one",
+            "a compressive strength that is more than p_m gives by a share of", "more strength", "%",
+            0.15, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.03, 0.07, 0.13), _add_strength,
+        ),
+        LawPlace(
+            "force of depth", "depth", "tip radii", "Pa", "upward force over the cross-section of the tip",
+            "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
+            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_pressure_of_depth,
+        ),
+        LawPlace(
+            "force of speed", "speed", "m/s", "Pa", "force against the motion over the cross-section of the tip",
+            "a force against the motion, over the tip's cross-section, of", "force against the motion", "Pa",
+            2.0, 0.0, "pushes along the motion", 400.0, (0.0, 0.1, 0.3, 0.6, 1.2), _add_pressure_of_speed,
+        ),
+        LawPlace(
+            "mass of depth", "depth", "tip radii", "1", "dust that moves with the tip over the projectile's mass",
+            "dust that moves with the tip, over the mass of the projectile, of", "mass that sticks", "%",
+            12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass,
+        ),
+        LawPlace(
+            "strength of size", "radius of the tip", "mm", "1", "ln of the strength over what p_m gives",
+            "a strength whose logarithm differs from that of p_m by", "ln strength", "1",
+            5.0, -math.inf, "", 0.3, (), _add_size, simulated=False,
+        ),
+        LawPlace(
+            "clock of depth", "depth", "mm", "ms", "time by which a point at that depth is exposed later",
+            "a camera that exposes the tip later by", "later (ms)", "ms",
+            10.0, -0.6, "", 0.3, (), None, simulated=False, most=0.6,  # a tip of 1 m/s must not outrun the rows
+            see=lambda camera, value: camera.replace(row_delay=camera.row_delay + value),
+        ),
+        LawPlace(
+            "clock of time", "time", "s", "1", "share by which the time between frames has grown since contact",
+            "a camera whose time between frames grows by", "longer", "1",
+            0.1, -30.0, "", 10.0, (), None, simulated=False, most=30.0,  # in 30 ms the rate must not turn around
+            see=lambda camera, value: camera.replace(clock_drift=camera.clock_drift + value),
+        ),
+    )
+}  # fmt: skip
