@@ -6,7 +6,9 @@ Deceleration over fortieths of each run's own stopping time, over its mean: p_m'
 changes of that, in %, and how far it is off from the mesh of 16 cells (benchmarks/lagrangian_mesh), rms of three drops. What is
 rough alike at every resolution is the mesh's own.
 
-A second table has how alike two effects are: what is left of the one's change, rms %, after the best multiple of the other's.
+A second table has how far what an effect changes is off with one spacing, and with the mean of two (FELT_SPACINGS), from that
+with a third between them. A third table has how alike two effects are: what is left of the one's change, rms %, after the best
+multiple of the other's.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from benchmarks.lagrangian_mesh import mesh
 from labsim.campaign import read_campaign
 from labsim.effects import list_effects, list_places
 from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.grid import FELT_SPACINGS
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
@@ -81,7 +84,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     workers = parser.parse_args().workers
     kinds = [(True, cells) for cells in OWN] + [(False, cells) for cells in MESH]
-    asked = [(*kind, name, speed) for kind in kinds for name in ("", *EFFECTS) for speed in SPEEDS]
+    beside = [(True, OWN[0] / factor) for factor in FELT_SPACINGS]
+    asked = [(*kind, name, speed) for kind in kinds + beside for name in ("", *EFFECTS) for speed in SPEEDS]
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = dict(zip(asked, pool.map(run, asked), strict=True))
     words = [f"labsim, {cells:g}" for cells in OWN] + [f"mesh, {cells:g}" for cells in MESH[1:]]
@@ -97,6 +101,16 @@ def main() -> None:
         reference = references[name] = changed[False, MESH[0]]
         off = [float(np.std(changed[kind] - reference)) for kind in kinds if kind != (False, MESH[0])]
         print(f"| {name} | {reference.std():.1f} | " + " | ".join(f"{each:.1f}" for each in off) + " |")
+
+    print("\n| effect | one spacing, off by rms % | the mean of two |")
+    print("|---|---|---|")
+    for name in EFFECTS:
+        one, other, between = (
+            100
+            * np.array([found[True, cells, name, speed] - found[True, cells, "", speed] for speed in SPEEDS])
+            for cells in (*(OWN[0] / factor for factor in FELT_SPACINGS), OWN[0])
+        )
+        print(f"| {name} | {np.std(one - between):.1f} | {np.std((one + other) / 2 - between):.1f} |")
 
     print("\n| what is left of | " + " | ".join(f"after {name}" for name in EFFECTS) + " |")
     print("|---" * (1 + len(EFFECTS)) + "|")

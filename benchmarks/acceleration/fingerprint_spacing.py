@@ -28,6 +28,7 @@ from labsim.runs.store import RunStore
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "f161"
 # spacings in a tip radius, and of how many runs the mean is taken; the first is that of fits
 RUNS = ((8, 2), (8, 1), (6, 2), (6, 1))
+USUAL = grid.Family.spacings
 
 
 def find_fingerprints(campaign: Campaign, spacings: int, count: int) -> tuple[dict[str, np.ndarray], float]:
@@ -36,7 +37,9 @@ def find_fingerprints(campaign: Campaign, spacings: int, count: int) -> tuple[di
     factors = tuple(
         grid.FELT_CELLS / spacings * each for each in (grid.FELT_SPACINGS if count == 2 else (1.0,))
     )
-    grid.Family.spacings = lambda family, cells: grid.FELT_SPACINGS if cells is None else factors  # type: ignore[method-assign]
+    grid.Family.spacings = lambda family, cells, *rest: (  # type: ignore[method-assign]
+        USUAL(family, cells, *rest) if cells is None else factors
+    )
     with tempfile.TemporaryDirectory() as folder:
         bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
         bench.grid.store = RunStore(Path(folder))

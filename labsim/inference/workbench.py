@@ -97,15 +97,15 @@ class Workbench:
     def _encode(
         self, number: int, index: float, variant: str, cells: int | None
     ) -> list[tuple[ResponseTable, FloatArray | None]]:
-        """Codes of one family, (speeds, m), means over spacings, for each table that rests on them; None where a run failed."""
+        """Codes of one family, (speeds, spacings, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(variant, index, cells, number)
-        alike = len(self.families[number].spacings(cells))
+        alike = len(self.families[number].spacings(cells, 0, variant != ""))
 
         def encode(each: RunFeatures) -> FloatArray | None:
             if runs is None:
                 return None
             codes = np.array([each.encode(run) for run in runs])
-            return np.asarray(codes.reshape(-1, alike, codes.shape[1]).mean(axis=1))
+            return codes.reshape(-1, alike, codes.shape[1])
 
         return [(each.table, encode(each)) for each in self.features if each.family == number]
 
@@ -120,7 +120,7 @@ class Workbench:
     def _fill_base(self, number: int, index: float) -> None:
         for table, codes in self._encode_plain(number, index, None):
             if codes is not None:
-                table.base[index] = codes
+                table.base[index] = codes.mean(axis=1)
 
     def _fill_change(self, number: int, index: float, name: str, amplitude: float, cells: int | None) -> None:
         variant = self._variant(name, amplitude)
@@ -132,8 +132,12 @@ class Workbench:
             kept = table.changes if cells is None else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
-            if codes is not None and plain is not None:
-                entry[amplitude] = codes - plain
+            if codes is not None and plain is not None:  # each on its own spacing
+                speeds = np.arange(len(codes))
+                alike = (
+                    plain if plain.shape == codes.shape else plain[speeds, speeds % plain.shape[1]][:, None]
+                )
+                entry[amplitude] = (codes - alike).mean(axis=1)
 
     def state(self, family: Family, name: str = "") -> DropSetting:
         """The nominal model of one family, or of one of its pushes at its own speed, in the middle of the range of p_m."""

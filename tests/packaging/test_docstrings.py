@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from itertools import pairwise
 
 import pytest
 
@@ -15,7 +16,7 @@ def sections(text: str) -> set[str]:
     lines = text.splitlines()
     return {
         title
-        for title, below in zip(lines, lines[1:], strict=False)
+        for title, below in pairwise(lines)
         if below and set(below) == {"-"} and len(below) == len(title)
     }
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -40,7 +39,9 @@ INERTIA = 0.005  # ρ v² of a push over its resistance
 # of drops with an accelerometer: the force needs more than the depth does (benchmarks/acceleration/error.py). Of fingerprints
 # too: with 6 spacings those of weak causes point elsewhere (benchmarks/acceleration/fingerprint_spacing.py)
 FELT_CELLS = 8
-# a run's force is rough where its particles happen to lie: the mean over these factors on the spacing is compared
+# a run's force is rough where its particles happen to lie: the mean over these factors on the spacing is compared. What a cause
+# changes is taken with one of them, in turn from speed to speed: two codes differ in it by more than two lattices do
+# (benchmarks/acceleration/effect_roughness.py)
 FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
 # (benchmarks/acceleration/effect_roughness.py)
@@ -65,9 +66,12 @@ class Family:
     pushed: bool = False
     felt: bool = False
 
-    def spacings(self, cells: int | None) -> tuple[float, ...]:
-        """Factors on the usual spacing of which there is a run each; fingerprints (``cells``) have one."""
-        return FELT_SPACINGS if self.felt and cells is None else (1.0,)
+    def spacings(self, cells: int | None, position: int, changed: bool) -> tuple[float, ...]:
+        """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``cells``), and what
+        is changed by a cause, have one."""
+        if not self.felt or cells is not None:
+            return (1.0,)
+        return (FELT_SPACINGS[position % len(FELT_SPACINGS)],) if changed else FELT_SPACINGS
 
 
 @dataclass(frozen=True)
@@ -258,8 +262,9 @@ class RunGrid:
         for request, number in missing:
             family = self.families[number]
             positions = range(len(family.speeds)) if request.cells is None else family.few
-            spacings = family.spacings(request.cells)
-            for position, factor in product(positions, spacings):
+            changed = request.variant != ""
+            laid = [(k, factor) for k in positions for factor in family.spacings(request.cells, k, changed)]
+            for position, factor in laid:
                 setting = self.setting(
                     family, family.speeds[position], strength_node(request.index), request.cells
                 )
@@ -267,7 +272,7 @@ class RunGrid:
                 setting = setting.replace(spacing=factor * setting.spacing)
                 settings.append(hasten(setting) if family.pushed else setting)
                 parts.append(Push if family.pushed else Compaction if family.is_scan else Motion)
-            places.append((request, number, len(positions) * len(spacings)))
+            places.append((request, number, len(laid)))
         if not settings:
             return
         runs = self.store.get_parts(
