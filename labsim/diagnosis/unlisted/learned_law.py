@@ -22,7 +22,7 @@ from ...inference.fits.settle import list_large, settle
 from ...inference.workbench import Workbench
 from ...records import FloatArray
 from ..explore import FACTORS, fit_from_strengths
-from ..gain import Gain, HeldOut, measure_gain, predict_held_out
+from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import SIZES, Marginal, Tangents, integrate
 from .hats import FreeLaw, list_applicable, make_effect, shape_at
@@ -53,10 +53,12 @@ class Formula:
 
 @dataclass(frozen=True)
 class LearnedLaw:
-    """formulas : those that were simulated, the one with most evidence first; bench : with their terms among its effects."""
+    """formulas : those that were simulated, the one with most evidence first; bench : with their terms among its effects.
+    repeated : gain of the best on drops that neither fit has seen, both repeated without them; None of a single drop."""
 
     formulas: tuple[Formula, ...]
     bench: Workbench
+    repeated: Gain | None
 
     @property
     def best(self) -> Formula:
@@ -70,7 +72,7 @@ class LearnedLaw:
 
 def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOut) -> LearnedLaw | None:
     """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
-    and gives held-out drops a higher probability.
+    and gives held-out drops a higher probability, the best of them where its fit is repeated without them too.
 
     before : the nominal model's predictions of held-out drops.
     """
@@ -104,9 +106,16 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
             gain = measure_gain(before, held_out)
             if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
                 formulas.append(Formula(tuple(terms[name] for name in fit.hypothesis), fit, held_out, gain))
-    if not formulas:
-        return None
-    return LearnedLaw(tuple(sorted(formulas, key=lambda each: -each.fit.evidence)), free)
+    formulas.sort(key=lambda each: -each.fit.evidence)
+    if len(bench.tracks.samples) < 2:
+        return LearnedLaw(tuple(formulas), free, None) if formulas else None
+    without = hold_out_folds(bench, nominal) if formulas else None
+    for k, formula in enumerate(formulas):
+        assert without is not None
+        gain = measure_gain(without, hold_out_folds(free, formula.fit))
+        if gain.log_score_difference > 0.0:
+            return LearnedLaw(tuple(formulas[k:]), free, gain)
+    return None
 
 
 def _fit(

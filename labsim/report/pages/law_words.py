@@ -144,7 +144,7 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
     learned = found.learned
     if learned is None:
         return None
-    best = learned.best
+    best, gain = learned.best, learned.repeated or learned.best.gain
     log_p_m, sigma = best.fit.log_p_m, math.sqrt(best.fit.covariance[0, 0])
     return {
         "terms": [
@@ -164,9 +164,9 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
             for each in learned.formulas[1:]
         ],
         "held_out": {
-            "rms_before_m": best.gain.rms_nominal,
-            "rms_after_m": best.gain.rms_extended,
-            "rms_noise_m": best.gain.rms_noise,
+            "rms_before_m": gain.rms_nominal,
+            "rms_after_m": gain.rms_extended,
+            "rms_noise_m": gain.rms_noise,
         },
     }
 
@@ -176,9 +176,9 @@ def say_learned(found: Diagnosis) -> list[str]:
     if found.learned is None:
         return []
     best, alike = found.learned.best, found.learned.alike
+    gain = found.learned.repeated or best.gain
     before, after, noise = (
-        show_number(1e6 * rms, "{:.1f}")
-        for rms in (best.gain.rms_nominal, best.gain.rms_extended, best.gain.rms_noise)
+        show_number(1e6 * rms, "{:.1f}") for rms in (gain.rms_nominal, gain.rms_extended, gain.rms_noise)
     )
     p_m, sigma = math.exp(best.fit.log_p_m) / 1e3, math.sqrt(best.fit.covariance[0, 0])
     said = [
