@@ -276,13 +276,14 @@ def calibrate(
         For an unknown parameter, and where measuring or simulating fails.
     """
     read = _read(campaign)
-    if read.has_records:
-        from .inference.calibrate import calibrate as calibrate_tracks
+    with _one_thread():
+        if read.has_records:
+            from .inference.calibrate import calibrate as calibrate_tracks
 
-        return calibrate_tracks(read, parameters, store=_open(store), **settings)
-    from .inference.published.calibrate import calibrate_summary
+            return calibrate_tracks(read, parameters, store=_open(store), **settings)
+        from .inference.published.calibrate import calibrate_summary
 
-    return calibrate_summary(read, _open(store), **settings)
+        return calibrate_summary(read, _open(store), **settings)
 
 
 def diagnose(
@@ -325,26 +326,27 @@ def diagnose(
     LabsimError
     """
     read, opened = _read(campaign), _open(store)
-    if read.has_records:
-        from .diagnosis.campaign import diagnose_campaign
+    with _one_thread():
+        if read.has_records:
+            from .diagnosis.campaign import diagnose_campaign
 
-        return diagnose_campaign(
-            read,
-            opened,
-            workers=workers,
-            scheduler=scheduler,
-            seed=seed,
-            progress=progress,
-            use_scans=use_scans,
-            cells=cells,
+            return diagnose_campaign(
+                read,
+                opened,
+                workers=workers,
+                scheduler=scheduler,
+                seed=seed,
+                progress=progress,
+                use_scans=use_scans,
+                cells=cells,
+            )
+        from .diagnosis.published.campaign import diagnose_summary
+        from .inference.published.calibrate import calibrate_summary
+
+        calibration = calibrate_summary(
+            read, opened, workers=workers, scheduler=scheduler, seed=seed, progress=progress
         )
-    from .diagnosis.published.campaign import diagnose_summary
-    from .inference.published.calibrate import calibrate_summary
-
-    calibration = calibrate_summary(
-        read, opened, workers=workers, scheduler=scheduler, seed=seed, progress=progress
-    )
-    return diagnose_summary(calibration, opened, workers=workers, scheduler=scheduler, progress=progress)
+        return diagnose_summary(calibration, opened, workers=workers, scheduler=scheduler, progress=progress)
 
 
 def write_report(
@@ -547,6 +549,16 @@ def _find_posterior(found: object) -> Posterior | None:
     """Of a calibration or diagnosis: with the cause, where one is found."""
     found = getattr(found, "calibration", found)  # of published figures
     return getattr(found, "posterior_extended", None) or getattr(found, "posterior", None)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Linear algebra in one thread, as in the commands: the same sums on every machine, and no threads that fight the workers."""
+    import scipy.linalg  # noqa: F401  (only what is loaded can be told)
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        yield
 
 
 def _read(campaign: Campaign | Path | str) -> Campaign:

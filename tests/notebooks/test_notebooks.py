@@ -17,6 +17,7 @@ FOLDER = Path(__file__).parents[2] / "notebooks"
 GALLERY = {  # which of its pictures stands for a notebook in docs/gallery.md; LABSIM_REWRITE_DOCS=1 draws them anew
     "track_projectile": 1, "density_contour": 1, "calibrate_p_m": 1, "find_the_cause": 0, "real_soundings": 1,
     "seed_experiment": 0, "acceleration_records": 0, "static_tests": 0,
+    "learn_the_missing_law": 0,
 }  # fmt: skip
 LONGEST = 900  # s for one cell on a loaded machine
 # name -> (pictures, what the printed text must hold)
@@ -60,6 +61,14 @@ NOTEBOOKS = {
         [
             r"compression_omnidirectional, p-value 0\.\d+\n +p_m = 1[23]\.\d+ ± 0\.\d+ kPa\n +phi_1 = 0\.12",
             r"p_m at rest 1[23]\.\d+ ± 0\.\d+ kPa \(published 13\), (9|10)\.\d times",
+        ],
+    ),
+    "learn_the_missing_law": (
+        2,
+        [
+            r"verdict: unknown",
+            r" 0\.0 behind +inertial_drag: \(\d{3} ± \d+\) Pa s²/m² × v²\n",
+            r"inertial_drag = \d+",
         ],
     ),
     "find_the_cause": (3, [r"verdict: effect", r"pixel_scale +(1|0\.9\d*)\n"]),
