@@ -80,25 +80,7 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     free = replace(bench, effects={**bench.effects, **{n: make_effect(terms[n], units[n]) for n in terms}})
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
-    afar: dict[Hypothesis, Fit | None] = {}
-    for names, _ in chosen:  # before there are finer runs, which coarse ones do not stand beside
-        top = max([nominal.evidence, *(fit.evidence for fit in afar.values() if fit)])
-        with suppress(LabsimError):
-            afar[names] = fit_from_strengths(free, nominal, names, top, FACTORS[1:])
-    fits = []
-    for names, marginal in chosen:
-        more, *shares = (float(each) for each in marginal.coefficients)
-        values = {name: share * units[name] for name, share in zip(names, shares, strict=True)}
-        found = _fit(free, names, (tangents.log_p_m + more, values), nominal)
-        far = afar.get(names)
-        if far is not None and far.evidence > max([nominal.evidence, *(fit.evidence for fit in found)]):
-            found += _fit(free, names, (far.log_p_m, far.values), far)
-        fits += sorted(found, key=lambda fit: -fit.evidence)[:1]
-    fits.sort(key=lambda fit: -fit.evidence)
-    for k, fit in enumerate(fits[:MOST_SETTLED]):
-        if list_large(free, fit):
-            with suppress(LabsimError):
-                fits[k] = settle(free, fit)
+    fits = fit_formulas(free, nominal, tangents.log_p_m, chosen, units)
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -116,6 +98,37 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
         if gain.log_score_difference > 0.0:
             return LearnedLaw(tuple(formulas[k:]), free, gain)
     return None
+
+
+def fit_formulas(
+    bench: Workbench,
+    nominal: Fit,
+    log_p_m: float,
+    chosen: Sequence[tuple[Hypothesis, Marginal]],
+    units: Mapping[str, float],
+) -> list[Fit]:
+    """Each with its own runs from what it was weighed at, about ``log_p_m``, and from other strengths where coarse runs say that
+    more is to be had there; best first, MOST_SETTLED of them among runs about themselves."""
+    afar: dict[Hypothesis, Fit | None] = {}
+    for names, _ in chosen:  # before there are finer runs, which coarse ones do not stand beside
+        top = max([nominal.evidence, *(fit.evidence for fit in afar.values() if fit)])
+        with suppress(LabsimError):
+            afar[names] = fit_from_strengths(bench, nominal, names, top, FACTORS[1:])
+    fits = []
+    for names, marginal in chosen:
+        more, *shares = (float(each) for each in marginal.coefficients)
+        values = {name: share * units[name] for name, share in zip(names, shares, strict=True)}
+        found = _fit(bench, names, (log_p_m + more, values), nominal)
+        far = afar.get(names)
+        if far is not None and far.evidence > max([nominal.evidence, *(fit.evidence for fit in found)]):
+            found += _fit(bench, names, (far.log_p_m, far.values), far)
+        fits += sorted(found, key=lambda fit: -fit.evidence)[:1]
+    fits.sort(key=lambda fit: -fit.evidence)
+    for k, fit in enumerate(fits[:MOST_SETTLED]):
+        if list_large(bench, fit):
+            with suppress(LabsimError):
+                fits[k] = settle(bench, fit)
+    return fits
 
 
 def _fit(
