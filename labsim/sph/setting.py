@@ -43,7 +43,40 @@ class Numerics:
 class DropSetting:
     """One drop. SI throughout; in the plane the projectile's mass is per metre of cylinder.
 
-    The lower block are the terms of the catalogue of effects; at their defaults each does nothing.
+    Parameters
+    ----------
+    projectile, material : Projectile, Material
+        What falls, and into what.
+    impact_speed : float
+        m/s at the start, of a free projectile; of no meaning to one that is led.
+    filling_factor, monomer_density : float
+        Of the dust at the start; kg/m³ of its grains' own material.
+    gravity : float
+        m/s².
+    geometry : str
+        "axisymmetric" or "planar".
+    spacing : float
+        m, between particles. A sixth to an eighth of the tip's radius is usual.
+    duration, after_stop : float
+        s, when the run ends at the latest; how long it goes on after the stop, in stopping times.
+    width, depth : float, optional
+        m of the dust: half width (planar: full width) and depth. Default: enough for this drop.
+    numerics : Numerics
+        Choices of the discretisation.
+    motion : Motion
+        What moves the projectile: by default it falls freely.
+    strength_rate, strength_rate_exponent : float
+        Σ (1 + strength_rate ε̇ⁿ). Like all that follow, a term of an effect that does nothing at its default.
+    pore_gas : float
+        Pa of gas in the pores.
+    crust_excess, crust_length, filling_gradient : float
+        The dust begins at φ0 + crust_excess exp(-depth / crust_length) + filling_gradient depth; 1, m, 1/m.
+    side_friction : float
+        N/m, times the immersed length.
+    strength_shape : tuple of (float, float)
+        Filling factor and factor on Σ; tables are linear between their rows.
+    force_of_depth, force_of_speed, mass_of_depth : tuple of (float, float)
+        m and N upwards; m/s and N against the motion; m and kg of dust that move with the tip.
     """
 
     projectile: Projectile
