@@ -53,7 +53,7 @@ TERM = Term("hidden", "hidden", "{place}", "1", "", lambda x: {shape} + 0.0 * x,
 
 
 def change_{of}({of}, values, place):
-    return {verb}_term({of}, TERM, values["share"]{factor})
+    return {verb}_term({of}, TERM, values["share"])
 '''
 
 
@@ -74,8 +74,7 @@ def main() -> None:
             own.parent.mkdir()
             camera = LAW_PLACES[place].see is not None
             of, verb = ("instrument", "see") if camera else ("setting", "add")
-            factor = f" * {eval(shape, {'x': 1.0})}" if camera else ""
-            own.write_text(EFFECT.format(place=place, shape=shape, of=of, verb=verb, factor=factor))
+            own.write_text(EFFECT.format(place=place, shape=shape, of=of, verb=verb))
             truth = TruthTable(
                 replace(campaign, folder=Path(folder)), RunStore(given.store), workers=given.workers
             )

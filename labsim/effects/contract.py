@@ -164,7 +164,7 @@ class Instrument:
         return np.asarray(time) * self.rate_factor
 
     def true_time(self, time: FloatArray) -> FloatArray:
-        """The reverse."""
+        """True time (s) of an instant to which the stated frame rate gives this one (s)."""
         return np.asarray(time) / self.rate_factor
 
     def stated_depth(self, depth: FloatArray, pixel_size: float) -> FloatArray:

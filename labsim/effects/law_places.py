@@ -24,19 +24,18 @@ LEAST = 0.1  # of the strength that p_m gives, which a law must leave
 
 @dataclass(frozen=True)
 class LawPlace:
-    """over, unit : what a law goes with there; value_unit, values : what it gives; words : that in front of a formula.
+    """over, unit : what a law goes with there; value_unit : of what it gives; words : that in front of a formula.
 
     shown, shown_unit : that at an axis. reach : of what it goes with, as far as drops come. least : smallest value, a smaller one
     ``breaks`` physics; of a camera's, and most, ends of its coefficients. scale : a usual value. knots : of what it goes with,
-    for a law without a formula. simulated : what it changes is known from runs, or without any. add : to a drop, a table of
-    knots; see : to a camera, a coefficient.
+    for a law without a formula; none where no runs are needed to say what it changes. add : to a drop, a table of knots; see : to
+    a camera, a coefficient.
     """
 
     name: str
     over: str
     unit: str
     value_unit: str
-    values: str
     words: str
     shown: str
     shown_unit: str
@@ -46,9 +45,13 @@ class LawPlace:
     scale: float
     knots: tuple[float, ...]
     add: Callable[[DropSetting, Knots], DropSetting] | None
-    simulated: bool = True
     see: Callable[[Instrument, float], Instrument] | None = None
     most: float = math.inf
+
+    @property
+    def simulated(self) -> bool:
+        """Whether runs say what a law changes there."""
+        return bool(self.knots)
 
     @property
     def key(self) -> str:
@@ -121,40 +124,40 @@ LAW_PLACES = {
     place.name: place
     for place in (
         LawPlace(
-            "strength of filling factor", "filling factor", "1", "1", "strength over what p_m gives, minus one",
+            "strength of filling factor", "filling factor", "1", "1",
             "a compressive strength that is more than p_m gives by a share of", "more strength", "%",
             0.15, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.03, 0.07, 0.13), _add_strength,
         ),
         LawPlace(
-            "force of depth", "depth", "tip radii", "Pa", "upward force over the cross-section of the tip",
+            "force of depth", "depth", "tip radii", "Pa",
             "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
             12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_pressure_of_depth,
         ),
         LawPlace(
-            "force of speed", "speed", "m/s", "Pa", "force against the motion over the cross-section of the tip",
+            "force of speed", "speed", "m/s", "Pa",
             "a force against the motion, over the tip's cross-section, of", "force against the motion", "Pa",
             2.0, 0.0, "pushes along the motion", 400.0, (0.0, 0.1, 0.3, 0.6, 1.2), _add_pressure_of_speed,
         ),
         LawPlace(
-            "mass of depth", "depth", "tip radii", "1", "dust that moves with the tip over the projectile's mass",
+            "mass of depth", "depth", "tip radii", "1",
             "dust that moves with the tip, over the mass of the projectile, of", "mass that sticks", "%",
             12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass,
         ),
         LawPlace(
-            "strength of size", "radius of the tip", "mm", "1", "ln of the strength over what p_m gives",
+            "strength of size", "radius of the tip", "mm", "1",
             "a strength whose logarithm differs from that of p_m by", "ln strength", "1",
-            5.0, -math.inf, "", 0.3, (), _add_size, simulated=False,
+            5.0, -math.inf, "", 0.3, (), _add_size,
         ),
         LawPlace(
-            "clock of depth", "depth", "mm", "ms", "time by which a point at that depth is exposed later",
-            "a camera that exposes the tip later by", "later (ms)", "ms",
-            10.0, -0.6, "", 0.3, (), None, simulated=False, most=0.6,  # a tip of 1 m/s must not outrun the rows
+            "clock of depth", "depth", "mm", "ms",
+            "a camera that exposes the tip later by", "later", "ms",
+            10.0, -0.6, "", 0.3, (), None, most=0.6,  # a tip of 1 m/s must not outrun the rows
             see=lambda camera, value: camera.replace(row_delay=camera.row_delay + value),
         ),
         LawPlace(
-            "clock of time", "time", "s", "1", "share by which the time between frames has grown since contact",
+            "clock of time", "time", "s", "1",
             "a camera whose time between frames grows by", "longer", "1",
-            0.1, -30.0, "", 10.0, (), None, simulated=False, most=30.0,  # in 30 ms the rate must not turn around
+            0.1, -30.0, "", 10.0, (), None, most=30.0,  # in 30 ms the rate must not turn around
             see=lambda camera, value: camera.replace(clock_drift=camera.clock_drift + value),
         ),
     )

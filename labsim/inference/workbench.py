@@ -128,15 +128,18 @@ class Workbench:
             return
         self._filled.add((number, index, variant, cells))
         before, after = self._encode_plain(number, index, cells), self._encode(number, index, variant, cells)
+        spacings = self.families[number].spacings  # a change is one from the run of the same spacing
         for (table, codes), (_, plain) in zip(after, before, strict=True):
             kept = table.changes if cells is None else table.fingerprints
             entry = kept.setdefault(name, {}).setdefault(index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
-            if codes is not None and plain is not None:  # each on its own spacing
-                speeds = np.arange(len(codes))
-                alike = (
-                    plain if plain.shape == codes.shape else plain[speeds, speeds % plain.shape[1]][:, None]
-                )
+            if codes is not None and plain is not None:
+                own = [
+                    spacings(cells, k, False).index(f)
+                    for k in range(len(codes))
+                    for f in spacings(cells, k, True)
+                ]
+                alike = np.take_along_axis(plain, np.reshape(own, (len(codes), -1, 1)), axis=1)
                 entry[amplitude] = (codes - alike).mean(axis=1)
 
     def state(self, family: Family, name: str = "") -> DropSetting:

@@ -28,7 +28,7 @@ from ...inference.workbench import Workbench
 from ...records import FloatArray
 from ...runs.parts import Push
 from ..screen import has_runs
-from .hats import FreeLaw, list_applicable, list_laws, make_effect, make_hats
+from .hats import FreeLaw, add_terms, list_laws, make_hats
 
 AHEAD = 10.0  # so much, in ln evidence, before a law that has no place in the equations
 # of the unit. A law of 3 to 24 % all along the way moves depths by 1 to 8 %; one hat is a fourth of the way
@@ -129,8 +129,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
     free.require_changes([(name, hat.amplitudes[0].step, index) for name, hat in hats.items()], "free law")
     names = [name for name in hats if has_runs(bench, name)]
     scales = {hat: law.scale for law in laws for hat in law.hats}
-    formulas, units = list_applicable(bench, ())  # those that need no runs
-    free.effects.update({name: make_effect(term, units[name]) for name, term in formulas.items()})
+    free, formulas, units = add_terms(free)
     scales |= units
     names += formulas
     kept = tuple(

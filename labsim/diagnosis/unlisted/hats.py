@@ -133,10 +133,14 @@ def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, f
     return change
 
 
-def list_applicable(bench: Workbench, laws: Sequence[FreeLaw]) -> tuple[dict[str, Term], dict[str, float]]:
-    """Terms that may be at work here, and of each the coefficient that changes as much as the law's scale where it is largest.
+def add_terms(
+    bench: Workbench, laws: Sequence[FreeLaw] = ()
+) -> tuple[Workbench, dict[str, Term], dict[str, float]]:
+    """The workbench with all terms that may be at work here among its effects; these; and of each the coefficient that changes as
+    much as the law's scale where it is largest.
 
-    laws : whose hats have runs. Not those that a cause of that name stands for, or which the data do not reach.
+    laws : whose hats have runs; without any, the terms that need none. Not those that a cause of that name stands for, or which
+    the data do not reach.
     """
     places = {law.name: law for law in laws if law.knots}
     radii = np.unique([1e3 * family.projectile.tip_radius for family in bench.families])
@@ -154,7 +158,8 @@ def list_applicable(bench: Workbench, laws: Sequence[FreeLaw]) -> tuple[dict[str
             continue
         if largest > 0.0:
             terms[name], units[name] = term, term.acts.scale / largest
-    return terms, units
+    effects = {name: make_effect(term, units[name]) for name, term in terms.items()}
+    return replace(bench, effects={**bench.effects, **effects}), terms, units
 
 
 def find_peak(term: Term, law: FreeLaw) -> float:
@@ -164,8 +169,7 @@ def find_peak(term: Term, law: FreeLaw) -> float:
 
 def fit_without_runs(bench: Workbench, nominal: Fit) -> dict[str, Fit]:
     """Every term that costs no runs, fitted: of the strength by the tip's radius, of the camera's clock."""
-    terms, units = list_applicable(bench, ())
-    free = replace(bench, effects={**bench.effects, **{n: make_effect(terms[n], units[n]) for n in terms}})
+    free, terms, _ = add_terms(bench)
     return {name: fit_hypothesis(free, (name,), (nominal.log_p_m, {}), nuisances=nominal) for name in terms}
 
 

@@ -25,7 +25,7 @@ from ..explore import FACTORS, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import SIZES, Marginal, Tangents, integrate
-from .hats import FreeLaw, list_applicable, make_effect, shape_at
+from .hats import FreeLaw, add_terms, shape_at
 from .unknown import log_mean
 
 MOST_SIMULATED = 4  # formulas, beside the best of every place
@@ -54,11 +54,11 @@ class Formula:
 @dataclass(frozen=True)
 class LearnedLaw:
     """formulas : those that were simulated, the one with most evidence first; bench : with their terms among its effects.
-    repeated : gain of the best on drops that neither fit has seen, both repeated without them; None of a single drop."""
+    repeated : gain of the best on drops that neither fit has seen, both repeated without them."""
 
     formulas: tuple[Formula, ...]
     bench: Workbench
-    repeated: Gain | None
+    repeated: Gain
 
     @property
     def best(self) -> Formula:
@@ -76,8 +76,7 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
 
     before : the nominal model's predictions of held-out drops.
     """
-    terms, units = list_applicable(bench, tangents.laws)
-    free = replace(bench, effects={**bench.effects, **{n: make_effect(terms[n], units[n]) for n in terms}})
+    free, terms, units = add_terms(bench, tangents.laws)
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
     fits = fit_formulas(free, nominal, tangents.log_p_m, chosen, units)
@@ -88,14 +87,13 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
             gain = measure_gain(before, held_out)
             if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
                 formulas.append(Formula(tuple(terms[name] for name in fit.hypothesis), fit, held_out, gain))
+    if not formulas:
+        return None
     formulas.sort(key=lambda each: -each.fit.evidence)
-    if len(bench.tracks.samples) < 2:
-        return LearnedLaw(tuple(formulas), free, None) if formulas else None
-    without = hold_out_folds(bench, nominal) if formulas else None
+    without = hold_out_folds(bench, nominal)
     for k, formula in enumerate(formulas):
-        assert without is not None
         gain = measure_gain(without, hold_out_folds(free, formula.fit))
-        if gain.log_score_difference > 0.0:
+        if not gain.log_score_difference <= 0.0:
             return LearnedLaw(tuple(formulas[k:]), free, gain)
     return None
 

@@ -105,5 +105,6 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
 
 
 def see_term(instrument: Instrument, term: Term, coefficient: float) -> Instrument:
-    """The camera with one term; with one of the drop it is the camera itself."""
-    return term.acts.see(instrument, coefficient) if term.acts.see else instrument
+    """The camera with one term, whose shape is a straight line; with one of the drop it is the camera itself."""
+    see = term.acts.see
+    return see(instrument, coefficient * float(term.shape(np.ones(1))[0])) if see else instrument

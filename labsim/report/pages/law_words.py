@@ -144,7 +144,7 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
     learned = found.learned
     if learned is None:
         return None
-    best, gain = learned.best, learned.repeated or learned.best.gain
+    best, gain = learned.best, learned.repeated
     log_p_m, sigma = best.fit.log_p_m, math.sqrt(best.fit.covariance[0, 0])
     return {
         "terms": [
@@ -176,7 +176,7 @@ def say_learned(found: Diagnosis) -> list[str]:
     if found.learned is None:
         return []
     best, alike = found.learned.best, found.learned.alike
-    gain = found.learned.repeated or best.gain
+    gain = found.learned.repeated
     before, after, noise = (
         show_number(1e6 * rms, "{:.1f}") for rms in (gain.rms_nominal, gain.rms_extended, gain.rms_noise)
     )
