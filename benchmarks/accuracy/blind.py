@@ -1,9 +1,10 @@
 """Diagnose a folder of labelled campaigns and compare with what was hidden in them.
 
-    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--out TABLE.md] [--workers 2]
+    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--out TABLE.md] [--rows ROWS.jsonl] [--workers 2]
 
 FOLDER holds campaigns and ``truth.json`` (cause, p_m, note per campaign). Prints top-1, class, false alarms, wrong
 names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaign's folder only; truth is opened afterwards.
+ROWS.jsonl keeps a line of JSON a campaign, with all evidences and the learned law; one that stands there is not judged again.
 
 gain is what the extension removes of what held-out drops show above the noise that is expected. What can be removed is what the
 hidden cause itself removes, at its true strength and p_m: "by truth" is its gain, "share" the part of the lowering of the mean
@@ -20,18 +21,22 @@ import re
 import subprocess
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from benchmarks.accuracy.hidden_laws import find_law
 from benchmarks.campaigns.labelled import SCATTER
 from benchmarks.material_points.compare_changes import HIDDEN
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
 from labsim.diagnosis.gain import measure_gain, predict_held_out
 from labsim.diagnosis.shapes import MARK
+from labsim.diagnosis.unlisted.hats import make_effect
+from labsim.effects.terms import list_terms
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.runs.store import RunStore
 
@@ -73,7 +78,41 @@ def describe(name: str, found: Diagnosis) -> dict:
         "alike": found.alike,
         "runs_new": found.runs_new,
         "wall": found.wall,
+        "evidence": describe_evidence(found),
+        "law": describe_law(found),
     }
+
+
+def describe_evidence(found: Diagnosis) -> dict:
+    """ln evidences over the nominal model's, and what else the verdict is made of: it can be made again by another rule."""
+    nominal = found.nominal.evidence
+    return {
+        "fitted": {name_hypothesis(fit.hypothesis): fit.evidence - nominal for fit in found.rivals},
+        "screened": {score.name: score.log_bayes for score in found.screening.scores},
+        "unknown": found.unknown.evidence - nominal,
+        "block": found.unknown.block,
+        "predicted": found.predicted,
+        "catalogue": list(found.bench.effects),
+        "felt": bool(found.bench.felt),
+    }
+
+
+def describe_law(found: Diagnosis) -> list[dict]:
+    """The formulas of what is missing, best first; none where none was learned."""
+    if found.learned is None:
+        return []
+    return [
+        {
+            "terms": {
+                term.name: [term.place, float(value), float(sigma)]
+                for term, value, sigma in zip(each.terms, each.coefficients, each.sigma, strict=True)
+            },
+            "evidence": each.fit.evidence - found.nominal.evidence,
+            "ln_p_m": [each.fit.log_p_m, float(np.sqrt(each.fit.covariance[0, 0]))],
+            "rms": [each.gain.rms_nominal, each.gain.rms_extended],
+        }
+        for each in found.learned.formulas
+    ]
 
 
 def read_hidden(truth: dict) -> dict[str, tuple[float, float | None]]:
@@ -98,8 +137,13 @@ def read_hidden(truth: dict) -> dict[str, tuple[float, float | None]]:
 def compare_gain(found: Diagnosis, truth: dict) -> dict:
     """The gain of what is hidden, at its true strength and p_m, and the share of what that removes which the extension does."""
     bench, hidden = found.bench, read_hidden(truth)
+    law = find_law(truth)
+    if law is not None and law.own is not None:
+        name, size = law.own
+        hidden = {name: (size, None)}
+        bench = replace(bench, effects={**bench.effects, name: make_effect(list_terms()[name], abs(size))})
     if not hidden or any(name not in bench.effects for name in hidden):
-        return {"by_truth": math.nan, "share": math.nan, "sigmas": math.nan}
+        return {"by_truth": math.nan, "share": math.nan, "sigmas": math.nan, "rms_by_truth": math.nan}
     amplitudes = {}
     for name, (value, shape) in hidden.items():
         effect, label = bench.effects[name], name
@@ -114,7 +158,19 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
     removed, removable = before - found.gain.rms_extended**2, before - true.rms_extended**2
     share = removed / removable if removable > LEAST_REMOVED * before else math.nan
     sigmas = math.sqrt(max(found.nominal.chi_square - fit.chi_square, 0.0))
-    return {"by_truth": true.fraction_removed, "share": share, "sigmas": sigmas}
+    return {
+        "by_truth": true.fraction_removed,
+        "share": share,
+        "sigmas": sigmas,
+        "rms_by_truth": true.rms_extended,
+    }
+
+
+def read_rows(path: Path | None) -> list[dict]:
+    """What was judged before."""
+    if path is None or not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def score(rows: list[dict], truth: dict) -> pd.DataFrame:
@@ -166,6 +222,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", default="")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--rows", type=Path)
     parser.add_argument("--workers", type=int, default=None)
     parser.add_argument("--store", type=Path, default=None)
     options = parser.parse_args()
@@ -174,20 +231,26 @@ def main() -> None:
     truths = options.folder / "truth.json"
     if only - names or not truths.exists():
         parser.error(f"{options.folder} has no {', '.join(sorted(only - names)) or truths.name}")
-    rows = []
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
+    ).stdout.strip()
+    rows = read_rows(options.rows)
     for name in sorted(only or names):
+        if name in {row["campaign"] for row in rows}:
+            continue
         began = time.perf_counter()
         found = diagnose_campaign(
             read_campaign(options.folder / name), RunStore(options.store), workers=options.workers
         )
-        rows.append(describe(name, found))
+        rows.append(describe(name, found) | {"commit": commit, "date": str(date.today())})
         top = ", ".join(f"{h} {p:.3f}" for h, p in rows[-1]["ranked"][:3])
         print(f"{name}: {top}  ({time.perf_counter() - began:.0f} s)", flush=True)
         rows[-1] |= compare_gain(found, json.loads(truths.read_text())[name])
+        if options.rows:
+            with options.rows.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+    rows = [row for row in rows if row["campaign"] in (only or names)]
     table = score(rows, json.loads(truths.read_text()))
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
-    ).stdout.strip()
     nulls, others = table[table.hidden == "none"], table[~table.hidden.isin(["none", "unknown"])]
     lines = [
         f"{date.today()}, commit {commit}: {len(table)} campaigns",

@@ -25,7 +25,7 @@ from labsim.inference.truths.synthetic import LABORATORY, Hidden, TruthTable, me
 from labsim.report.pages.law_words import describe_learned
 from labsim.runs.store import RunStore
 
-# name -> place and x -> value in Pa or share, or ms for x mm
+# name -> place and x -> value in Pa or share, or µs for x rows
 HIDDEN = {
     "inertial_drag": ("force of speed", "300.0 * x**2"),
     "drag_to_the_1.5": ("force of speed", "300.0 * x**1.5"),
@@ -33,7 +33,7 @@ HIDDEN = {
     "film_at_1.3": ("force of depth", "400.0 * np.exp(-0.5 * ((x - 1.3) / 0.3) ** 2)"),
     "hardening": ("strength of filling factor", "0.6 * 10 * x"),
     "size": ("strength of size", "0.5 * np.log(x)"),
-    "rows_one_after_another": ("clock of depth", "0.25 * x"),
+    "rows_one_after_another": ("clock of row", "5.0 * x"),
     "nothing": ("force of speed", "0.0 * x"),
 }
 EFFECT = '''"""Hidden here alone."""
@@ -53,7 +53,7 @@ TERM = Term("hidden", "hidden", "{place}", "1", "", lambda x: {shape} + 0.0 * x,
 
 
 def change_{of}({of}, values, place):
-    return {verb}_term({of}, TERM, values["share"])
+    return {verb}_term({of}, TERM, values["share"]{more})
 '''
 
 
@@ -73,8 +73,8 @@ def main() -> None:
             own = Path(folder) / "effects" / "hidden.py"
             own.parent.mkdir()
             camera = LAW_PLACES[place].see is not None
-            of, verb = ("instrument", "see") if camera else ("setting", "add")
-            own.write_text(EFFECT.format(place=place, shape=shape, of=of, verb=verb))
+            of, verb, more = ("instrument", "see", ", place") if camera else ("setting", "add", "")
+            own.write_text(EFFECT.format(place=place, shape=shape, of=of, verb=verb, more=more))
             truth = TruthTable(
                 replace(campaign, folder=Path(folder)), RunStore(given.store), workers=given.workers
             )

@@ -53,7 +53,7 @@ expect = {{}}
 
 
 def change_{of}({of}, values, place):
-    return {verb}_term({of}, TERM, values["coefficient"])
+    return {verb}_term({of}, TERM, values["coefficient"]{more})
 '''
 
 
@@ -134,8 +134,9 @@ def write_learned(out: Path, campaign: Path) -> list[Path]:
         path.write_text(
             LEARNED.format(
                 term=term, name=name, out=out.name, low=low, high=high, size=float(f"{abs(coefficient):.3g}"),
-                kind="measurement" if term.acts.see else "material" if term.place.startswith("strength") else "contact",
+                kind="measurement" if term.acts.see else "material" if "strength" in term.place else "contact",
                 of="instrument" if term.acts.see else "setting", verb="see" if term.acts.see else "add",
+                more=", place" if term.acts.see else "",
             ),
             encoding="utf-8",
         )  # fmt: skip

@@ -120,7 +120,7 @@ class Place:
 
     sequence_fraction: -0.5 for the first drop made, +0.5 for the last, 0 for scans. sample and nominal are what the
     campaign states; p_m stays in ``setting.material``. tip: of the stated projectile.
-    smallest_tip_radius: of the campaign's drops, m. position: east and north of the middle of all drops, m.
+    smallest_tip_radius: of the campaign's drops, m. position: east and north of the middle of all drops, m. pixel_size: m.
     """
 
     name: str
@@ -131,6 +131,7 @@ class Place:
     tip: str = "hemisphere"
     smallest_tip_radius: float = 0.5e-3
     position: tuple[float, float] | None = None
+    pixel_size: float = 1e-5
 
 
 @dataclass(frozen=True)
@@ -342,6 +343,7 @@ def list_places(campaign: Campaign) -> dict[str, Place]:
             drop.projectile.tip,
             smallest,
             position,
+            drop.camera.pixel_size if drop.camera else Place.pixel_size,
         )
     for scan in _list_scans(campaign):
         places[scan.name] = Place(

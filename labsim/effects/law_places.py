@@ -1,9 +1,9 @@
 """Where the equations, or the clock of a camera, have a place for a law that is not in them, one record each.
 
-    m (1 + d(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) exp(f(a))] - A b(z/a) - A c(v)
+    m (1 + d(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) exp(f(a)), Y (1 + h(ε))] - A b(z/a) - A c(v)
 
-m is the mass of the projectile, A the cross-section of its tip, a its radius: a force is a pressure, so that one law holds for
-all sizes.
+m is the mass of the projectile, A the cross-section of its tip, a its radius, ε the plastic shear strain of the dust. A force is
+a pressure, so that one law holds for all sizes.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from ..sph import DropSetting
 from .contract import Instrument
 
 Knots = tuple[tuple[float, float], ...]
+MOST_DELAY = 0.6  # s/m: a tip of 1 m/s must not outrun the rows
 LEAST = 0.1  # of the strength that p_m gives, which a law must leave
 
 
@@ -29,7 +30,7 @@ class LawPlace:
     shown, shown_unit : that at an axis. reach : of what it goes with, as far as drops come. least : smallest value, a smaller one
     ``breaks`` physics; of a camera's, and most, ends of its coefficients. scale : a usual value. knots : of what it goes with,
     for a law without a formula; none where no runs are needed to say what it changes. add : to a drop, a table of knots; see : to
-    a camera, a coefficient.
+    a camera, a coefficient at a size of its pixels (m).
     """
 
     name: str
@@ -45,7 +46,7 @@ class LawPlace:
     scale: float
     knots: tuple[float, ...]
     add: Callable[[DropSetting, Knots], DropSetting] | None
-    see: Callable[[Instrument, float], Instrument] | None = None
+    see: Callable[[Instrument, float, float], Instrument] | None = None
     most: float = math.inf
 
     @property
@@ -73,10 +74,14 @@ def _label(words: str, unit: str) -> str:
     return words if unit == "1" else f"{words} ({unit})"
 
 
-def _add_strength(setting: DropSetting, table: Knots) -> DropSetting:
-    """table : filling factor and share of the strength."""
-    factors = tuple((phi, max(1.0 + more, LEAST)) for phi, more in table)
-    return setting.replace(strength_shape=combine(setting.strength_shape, factors, product=True))
+def _add_share(key: str) -> Callable[[DropSetting, Knots], DropSetting]:
+    """What adds a share, over the first column of a table, to a strength: by the factors that the setting's key holds."""
+
+    def add(setting: DropSetting, table: Knots) -> DropSetting:
+        factors = tuple((place, max(1.0 + more, LEAST)) for place, more in table)
+        return setting.replace(**{key: combine(getattr(setting, key), factors, product=True)})
+
+    return add
 
 
 def _add_pressure_of_depth(setting: DropSetting, table: Knots) -> DropSetting:
@@ -104,6 +109,12 @@ def _add_size(setting: DropSetting, table: Knots) -> DropSetting:
     return setting.replace(material=set_value(setting.material, strength)) if more != 0.0 else setting
 
 
+def _delay_rows(camera: Instrument, value: float, pixel_size: float) -> Instrument:
+    """value : µs from one row to the next."""
+    delay = min(max(1e-6 * value / pixel_size, -MOST_DELAY), MOST_DELAY)
+    return camera.replace(row_delay=camera.row_delay + delay)
+
+
 def _section(setting: DropSetting) -> float:
     radius = setting.projectile.tip_radius
     return 2 * radius if setting.geometry == "planar" else math.pi * radius**2
@@ -126,7 +137,17 @@ LAW_PLACES = {
         LawPlace(
             "strength of filling factor", "filling factor", "1", "1",
             "a compressive strength that is more than p_m gives by a share of", "more strength", "%",
-            0.15, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.03, 0.07, 0.13), _add_strength,
+            0.15, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.03, 0.07, 0.13), _add_share("strength_shape"),
+        ),
+        LawPlace(
+            "strength of plastic strain", "plastic shear strain", "1", "1",
+            "a compressive strength, and the shear strength with it, that is more by a share of", "more strength", "%",
+            2.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.15, 0.6), _add_share("strength_of_strain"),
+        ),
+        LawPlace(
+            "shear strength of plastic strain", "plastic shear strain", "1", "1",
+            "a shear strength that is more by a share of", "more shear strength", "%",
+            2.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.15, 0.6), _add_share("shear_of_strain"),
         ),
         LawPlace(
             "force of depth", "depth", "tip radii", "Pa",
@@ -149,16 +170,15 @@ LAW_PLACES = {
             5.0, -math.inf, "", 0.3, (), _add_size,
         ),
         LawPlace(
-            "clock of depth", "depth", "mm", "ms",
-            "a camera that exposes the tip later by", "later", "ms",
-            10.0, -0.6, "", 0.3, (), None, most=0.6,  # a tip of 1 m/s must not outrun the rows
-            see=lambda camera, value: camera.replace(row_delay=camera.row_delay + value),
+            "clock of row", "row of the picture", "px", "µs",
+            "a camera that exposes the tip later by", "later", "µs",
+            1000.0, -100.0, "", 6.0, (), None, most=100.0, see=_delay_rows,
         ),
         LawPlace(
             "clock of time", "time", "s", "1",
             "a camera whose time between frames grows by", "longer", "1",
             0.1, -30.0, "", 10.0, (), None, most=30.0,  # in 30 ms the rate must not turn around
-            see=lambda camera, value: camera.replace(clock_drift=camera.clock_drift + value),
+            see=lambda camera, value, _: camera.replace(clock_drift=camera.clock_drift + value),
         ),
     )
 }  # fmt: skip

@@ -244,7 +244,7 @@ def make_instrument(model: Model, place: Place, effects: Mapping[str, Effect] | 
     for name, values in model.effects:
         instrument = known[name].apply_to_instrument(instrument, values, place)
     for name, coefficient in model.law.terms:
-        instrument = see_term(instrument, list_terms()[name], coefficient)
+        instrument = see_term(instrument, list_terms()[name], coefficient, place)
     return instrument
 
 

@@ -75,6 +75,8 @@ class DropSetting:
         N/m, times the immersed length.
     strength_shape : tuple of (float, float)
         Filling factor and factor on Σ; tables are linear between their rows.
+    strength_of_strain, shear_of_strain : tuple of (float, float)
+        Plastic shear strain and factor on Σ, or on Y.
     force_of_depth, force_of_speed, mass_of_depth : tuple of (float, float)
         m and N upwards; m/s and N against the motion; m and kg of dust that move with the tip.
     """
@@ -102,6 +104,8 @@ class DropSetting:
     filling_gradient: float = 0.0  # 1/m, growth of φ0 with depth, down to graded_depth
     side_friction: float = 0.0  # N/m (planar: N/m per metre), times the immersed length
     strength_shape: tuple[tuple[float, float], ...] = ()  # (φ, factor on Σ), linear between, constant beyond
+    strength_of_strain: tuple[tuple[float, float], ...] = ()  # (plastic shear strain, factor on Σ)
+    shear_of_strain: tuple[tuple[float, float], ...] = ()  # (plastic shear strain, factor on Y)
     force_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m, upward force N), linear between
     force_of_speed: tuple[
         tuple[float, float], ...

@@ -35,7 +35,7 @@ expect = {{}}
 
 
 def change_{of}({of}, values, place):
-    return {verb}_term({of}, list_terms()["{term}"], values["size"])
+    return {verb}_term({of}, list_terms()["{term}"], values["size"]{more})
 '''
 
 
@@ -43,13 +43,16 @@ def change_{of}({of}, values, place):
     ("term", "size", "words"),
     [
         ("size_power", 0.5, ("add", "material", "setting")),
-        ("rolling_shutter", 0.2, ("see", "measurement", "instrument")),
+        ("rolling_shutter", 4.0, ("see", "measurement", "instrument")),
     ],
 )
 def test_a_hidden_one_is_unknown_and_has_its_size(term, size, words, shared_store, tmp_path) -> None:
     verb, kind, of = words
+    more = ", place" if verb == "see" else ""
     (tmp_path / "effects").mkdir()
-    (tmp_path / "effects" / "hidden.py").write_text(EFFECT.format(verb=verb, kind=kind, of=of, term=term))
+    (tmp_path / "effects" / "hidden.py").write_text(
+        EFFECT.format(verb=verb, kind=kind, of=of, term=term, more=more)
+    )
     drops = tuple(drop for drop in CAMPAIGN.drops if drop.name in DROPS)
     campaign, store = replace(CAMPAIGN, drops=drops, scans=()), RunStore(shared_store)
     truth = TruthTable(replace(campaign, folder=tmp_path), store, workers=1)

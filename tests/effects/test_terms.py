@@ -13,6 +13,7 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.cli.effects import write_learned
 from labsim.effects import Instrument, list_effects
+from labsim.effects.contract import list_places
 from labsim.effects.law_places import LAW_PLACES, LEAST
 from labsim.effects.model import Model, apply_model, make_instrument, read_model, write_model
 from labsim.effects.terms import Law, add_term, apply_law, list_terms, see_term
@@ -24,6 +25,7 @@ CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
 SETTING = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.6, Material())
 AREA = math.pi * 5e-4**2
 TERMS = list_terms()
+PLACE = replace(list_places(read_campaign(CAMPAIGN))["D01"], pixel_size=20e-6)
 
 
 @pytest.mark.parametrize("name", TERMS)
@@ -39,8 +41,13 @@ def test_every_term_is_what_its_page_says(name):
     assert add_term(SETTING, term, 0.0) is SETTING
     if term.acts.least == 0.0:
         assert np.all(min(max(c, -1e9), 1e9) * values.min() >= 0 for c in (low, high))
-    if term.place == "strength of filling factor":
-        hardest = add_term(SETTING, term, max(low, -100.0)).strength_shape
+    if "strength" in term.place and term.acts.simulated:
+        changed = add_term(SETTING, term, max(low, -100.0))
+        [hardest] = [
+            law
+            for law in (changed.strength_shape, changed.strength_of_strain, changed.shear_of_strain)
+            if law
+        ]
         assert min(factor for _, factor in hardest) >= LEAST
     check_setting(add_term(SETTING, term, min(high, 0.1)))
 
@@ -92,9 +99,9 @@ def test_a_law_survives_its_file_and_reaches_the_drop(tmp_path):
     file = write_model(tmp_path / "model.toml", model)
     assert read_model(file) == model
     assert "# Pa s²/m², times v²" in file.read_text(encoding="utf-8")
-    shutter = replace(model, law=Law((("rolling_shutter", 0.2),)))
+    shutter = replace(model, law=Law((("rolling_shutter", 4.0),)))
     assert read_model(write_model(tmp_path / "shutter.toml", shutter)) == shutter
-    assert make_instrument(shutter, None).row_delay == 0.2
+    assert make_instrument(shutter, PLACE).row_delay == pytest.approx(0.2)  # s/m
     assert apply_model(SETTING, shutter, None).force_of_speed == ()
     made = apply_model(SETTING, model, None)
     assert made.material.p_m == 1012.0 and made.force_of_speed and made.force_of_depth
@@ -148,8 +155,8 @@ def test_a_learned_term_becomes_an_effect_of_the_campaign(tmp_path, name):
     effect = list_effects(read_campaign(campaign))[path.stem]
     assert effect.title == TERMS[name].title and effect.amplitudes[0].unit == TERMS[name].unit
     if TERMS[name].acts.see:
-        seen = effect.apply_to_instrument(Instrument(), {"coefficient": size}, None)
-        assert seen == see_term(Instrument(), TERMS[name], size) != Instrument()
+        seen = effect.apply_to_instrument(Instrument(), {"coefficient": size}, PLACE)
+        assert seen == see_term(Instrument(), TERMS[name], size, PLACE) != Instrument()
     else:
         made = effect.apply(SETTING, {"coefficient": size}, None)
         assert made == add_term(SETTING, TERMS[name], size) != SETTING

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import labsim
 from labsim.records import Material
@@ -98,11 +99,14 @@ def test_zero_stress_filling_factor(p_m, modulus, phi, expected):
 class OneParticle:
     """A single lump of dust that is compressed isotropically, as rings of radius 1."""
 
-    def __init__(self, material, phi=0.15, plain=True):
+    def __init__(self, material, phi=0.15, plain=True, **terms):
         self.setting = set_body(material, 1e-4, 1.0, geometry="axisymmetric", filling_factor=phi)
+        self.setting = self.setting.replace(**terms)
         state = fill_at_rest(self.setting, np.ones(1), np.zeros(1), np.array([phi]))
         self.row, self.own = name_rows(self.setting, state)
-        self.constants = dust.make_constants(self.setting)._replace(extras=() if plain else (1,))
+        self.constants = dust.make_constants(self.setting)._replace(
+            extras=() if plain and not terms else (1,)
+        )
         self.tables = dust.make_tables(self.setting)
 
     def move(self, phi, steps, shear=0.0):
@@ -204,3 +208,25 @@ def test_equation_numbers_are_those_of_the_paper():
     assert set(found) == {"4", "5", "6", "4-6"}
     assert "eq. 6" in (sirono.compressive_strength.__doc__ or "")
     assert "eq. 5" in (sirono.tensile_strength.__doc__ or "")
+
+
+@pytest.mark.parametrize("key, power", [("shear_of_strain", 1.0), ("strength_of_strain", 0.5)])
+@pytest.mark.parametrize("slope", [1.5, -0.8])
+def test_strength_goes_with_the_plastic_strain(key, power, slope):
+    """Pure shear at constant volume: q = 3 G (e - ε) = Y0 (1 + slope ε)^power, e the equivalent strain; a factor on Σ acts on Y
+    by its root. A factor of one changes no bit."""
+    material, strain = Material(p_m=1300.0), 0.6
+    lump = OneParticle(material, 0.2, **{key: ((0.0, 1.0), (1.0, 1.0 + slope))})
+    lump.move(0.2, 4000, shear=strain * np.sqrt(3.0) / 2.0)
+    modulus = material.shear_to_bulk * float(sirono.bulk_modulus(np.array([0.2]), material)[0])
+    strength = float(sirono.shear_strength(np.array([0.2]), material)[0])
+    plastic = brentq(
+        lambda x: 3.0 * modulus * (strain - x) - strength * (1.0 + slope * x) ** power, 0.0, strain
+    )
+    assert lump.own.sheared[0] == pytest.approx(plastic, rel=2e-4)
+    q = np.sqrt(3.0) * abs(lump.row.sxz[0])
+    assert q == pytest.approx(strength * (1.0 + slope * plastic) ** power, rel=1e-3)
+    one, plain = OneParticle(material, 0.2, **{key: ((0.0, 1.0),)}), OneParticle(material, 0.2, plain=False)
+    for each in (one, plain):
+        each.move(0.3, 500, shear=0.4)
+    assert one.row.sxz[0] == plain.row.sxz[0] and one.pressure == plain.pressure

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...effects import Effect, Instrument, Normal, Parameter
+from ...effects import Effect, Instrument, Normal, Parameter, Place
 from ...effects.contract import ChangeSetting
 from ...effects.law_places import LAW_PLACES, Knots, LawPlace
 from ...effects.terms import KNOTS, Term, add_term, list_terms, see_term
@@ -81,9 +81,10 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
             dust = tuple(round(level + more, 6) for more in place.knots if level + more < most)
             laws.append(FreeLaw(place, dust, dust, (dust[0], dust[-1])))
         elif place.simulated:
-            most = {"depth": deepest, "speed": fastest}[place.over]
-            # nought where nothing has moved: a force that does not change with speed is one of depth
-            reached = _reached(place.knots, most)[int(place.least == 0.0) :]
+            most = {"depth": deepest, "speed": fastest}.get(place.over, place.reach)
+            # nought where nothing has moved: a force that does not change with speed is one of depth, a strength that does not
+            # with strain is p_m
+            reached = _reached(place.knots, most)[int(place.least > -math.inf) :]
             laws.append(FreeLaw(place, place.knots, reached, (0.0, most)))
     return tuple(laws)
 
@@ -103,7 +104,7 @@ def make_hats(law: FreeLaw, deepest: Mapping[DropSetting, float] | None = None) 
         unit = tuple((place, 1.0 if place == knot else 0.0) for place in law.grid)
         step = STEP * law.scale
         # a force along the motion is for the fit to ask for; a strength that is left is for the simulation
-        lowest = law.place.least if law.over == "filling factor" else -1e5
+        lowest = law.place.least if -math.inf < law.place.least < 0.0 else -1e5
         unit_name, prior = law.place.value_unit, Normal(0.0, law.scale)
         parameter = Parameter("amplitude", unit_name, 0.0, (lowest, 1e5), prior, step, "of one hat")
         hats[name] = Effect(
@@ -121,11 +122,10 @@ def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, f
         if amplitude == 0.0:
             return setting
         reached = {
-            "filling factor": math.inf,
             "depth": deepest.get(setting, math.inf) / setting.projectile.tip_radius,
             "speed": FALLING * setting.impact_speed,
         }
-        if reached[law.over] <= begins:
+        if reached.get(law.over, math.inf) <= begins:
             return setting
         assert law.place.add is not None
         return law.place.add(setting, tuple((knot, amplitude * height) for knot, height in unit))
@@ -188,8 +188,8 @@ def make_effect(term: Term, unit: float) -> Effect:
     def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:
         return add_term(setting, term, values["coefficient"])
 
-    def see(instrument: Instrument, values: Mapping[str, float], place: object) -> Instrument:
-        return see_term(instrument, term, values["coefficient"])
+    def see(instrument: Instrument, values: Mapping[str, float], place: Place) -> Instrument:
+        return see_term(instrument, term, values["coefficient"], place)
 
     of_camera = term.acts.see is not None
     return Effect(

@@ -16,7 +16,7 @@ import numpy as np
 from ...extensions import list_modules
 from ...records import FloatArray
 from ...sph import DropSetting
-from ..contract import Instrument
+from ..contract import Instrument, Place
 from ..law_places import LAW_PLACES, Knots, LawPlace
 
 FASTEST = 1.3  # of the impact speed, that a force of speed is tabulated to
@@ -104,7 +104,11 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
     return add(setting, tuple(zip((begin + place).tolist(), value.tolist(), strict=True)))
 
 
-def see_term(instrument: Instrument, term: Term, coefficient: float) -> Instrument:
+def see_term(instrument: Instrument, term: Term, coefficient: float, place: Place) -> Instrument:
     """The camera with one term, whose shape is a straight line; with one of the drop it is the camera itself."""
     see = term.acts.see
-    return see(instrument, coefficient * float(term.shape(np.ones(1))[0])) if see else instrument
+    return (
+        see(instrument, coefficient * float(term.shape(np.ones(1))[0]), place.pixel_size)
+        if see
+        else instrument
+    )

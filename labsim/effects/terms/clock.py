@@ -4,8 +4,8 @@ from . import Term
 
 TERMS = (
     Term(
-        "rolling_shutter", "rows that are read one after another", "clock of depth", "ms/mm", "z",
-        lambda z: z, "Electronic rolling shutter: Liang, Chang & Chen (2008)",
+        "rolling_shutter", "rows that are read one after another", "clock of row", "µs", "rows",
+        lambda row: row, "Electronic rolling shutter: Liang, Chang & Chen (2008)",
     ),
     Term(
         "clock_drift", "a clock that drifts", "clock of time", "1/s", "t",

@@ -23,6 +23,8 @@ TERMS = {
     "strength_rate": 0.0,
     "pore_gas": 0.0,
     "strength_shape": (),
+    "strength_of_strain": (),
+    "shear_of_strain": (),
     "crust_excess": 0.0,
     "filling_gradient": 0.0,
 }

@@ -4,7 +4,8 @@
 
 Σ, T, Y and K are those of ``labsim.sph.sirono``; the shear modulus is shear_to_bulk K. The deviatoric stress follows Jaumann's
 rate and returns radially to √(3 J2) = Y (von Mises, hoop stress included).
-Optional terms: Σ (1 + η ε̇ⁿ) (1 + μ log10(ε̇/ε̇0)) with ε̇ the rate of compression; trapped gas p + P0 ((1 - φi)/(1 - φ) - 1).
+Optional terms: Σ (1 + η ε̇ⁿ) (1 + μ log10(ε̇/ε̇0)) with ε̇ the rate of compression; trapped gas p + P0 ((1 - φi)/(1 - φ) - 1);
+factors on Σ and on Y that go with the plastic shear strain, the sum of (√(3 J2) - Y)/(3 G) over all returns to the yield surface.
 """
 
 from __future__ import annotations
@@ -45,15 +46,27 @@ CALIBRATED = parts.Calibrated("p_m", 300.0, 6000.0)
 TERMS = tuple(parts.TERMS)  # of a setting that it takes: all
 
 
+STRAIN_TOP, STRAIN_SIZE = 4.0, 401  # of the table of what goes with the plastic strain; beyond it is constant
+
 sound_speed = parts.sound_speed
 
 
 class State(NamedTuple):
-    """Rows that this law carries: φ0', and Σ and |T| at the particle's φ (Pa)."""
+    """Rows that this law carries: φ0', Σ and |T| at the particle's φ (Pa), and, where something goes with it, the plastic shear
+    strain."""
 
     zero_stress: FloatArray
     compressive: FloatArray
     tensile: FloatArray
+    sheared: FloatArray
+
+
+class Tables(NamedTuple):
+    """strengths : over φ; of_strain, shear_of_strain : factors on Σ and Y over the plastic strain, empty where both are one."""
+
+    strengths: sirono.Strengths
+    of_strain: FloatArray
+    shear_of_strain: FloatArray
 
 
 class Constants(NamedTuple):
@@ -66,7 +79,7 @@ class Constants(NamedTuple):
     shear_factor: float
     rate: parts.Rate
     gas_pressure: float
-    extras: tuple[int, ...]  # empty: no rate term, no gas, exponent 4 of K. A type, so known to the compiler
+    extras: tuple[int, ...]  # empty: no term below, exponent 4 of K. A type, so known to the compiler
 
 
 def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -> tuple[State, FloatArray]:
@@ -76,7 +89,7 @@ def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -
     sound = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / (phi * setting.monomer_density))
     nothing = np.zeros(phi.size)
     zero_stress = sirono.zero_stress_filling_factor(phi, nothing + pressure, material)
-    return State(zero_stress, nothing, nothing), sound
+    return State(zero_stress, nothing, nothing, nothing), sound
 
 
 def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
@@ -113,7 +126,8 @@ def make_constants(setting: DropSetting) -> Constants:
     """The numbers of the law as the compiled update wants them."""
     material = setting.material
     (rate,) = parts.read_parameters(setting, parts.RATE)
-    plain = material.bulk_exponent == 4.0 and not rate.on and setting.pore_gas == 0.0
+    strained = setting.strength_of_strain or setting.shear_of_strain
+    plain = material.bulk_exponent == 4.0 and not rate.on and setting.pore_gas == 0.0 and not strained
     extras = () if plain else (1,)
     return Constants(
         setting.monomer_density, material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk,
@@ -121,9 +135,25 @@ def make_constants(setting: DropSetting) -> Constants:
     )  # fmt: skip
 
 
-def make_tables(setting: DropSetting) -> sirono.Strengths:
+def make_tables(setting: DropSetting) -> Tables:
     """What the compiled update looks up."""
-    return sirono.tabulate_strengths(setting.material, setting.strength_shape)
+    strengths = sirono.tabulate_strengths(setting.material, setting.strength_shape)
+    if not (setting.strength_of_strain or setting.shear_of_strain):
+        return Tables(strengths, np.zeros(0), np.zeros(0))
+    strain = np.linspace(0.0, STRAIN_TOP, STRAIN_SIZE)
+    factors = [
+        np.interp(strain, *np.asarray(law or ((0.0, 1.0),), dtype=float).T)
+        for law in (setting.strength_of_strain, setting.shear_of_strain)
+    ]
+    return Tables(strengths, *factors)
+
+
+@compiled
+def look_up_strain(factors, strain):
+    """A factor at a plastic strain."""
+    position = min(strain * ((STRAIN_SIZE - 1) / STRAIN_TOP), STRAIN_SIZE - 1.001)
+    cell = np.uint64(position)
+    return factors[cell] + (position - cell) * (factors[cell + np.uint64(1)] - factors[cell])
 
 
 @compiled
@@ -132,13 +162,14 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     committed here, once per step. exchange: growth of volume, 1/s, by exchange with neighbours. work: stress power spent so far,
     per mass; exchanged: what of it pressure gave up in the exchange; crushing: rate at which φ0' grew, 1/s.
 
-    Without extras (no rate term, no gas, exponent 4 of K) the loop has no branch and no call, and is vectorised.
+    Without extras (no optional term, exponent 4 of K) the loop has no branch and no call, and is vectorised.
     """
     solid_density, k0, gamma = constants.solid_density, constants.bulk_modulus, constants.bulk_exponent
     shear_to_bulk, shear_factor, gas = constants.shear_to_bulk, constants.shear_factor, constants.gas_pressure
     plain = len(constants.extras) == 0
     r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
     phi_zero, compressive, tensile, phi_initial = own.zero_stress, own.compressive, own.tensile, s.initial
+    sheared, strained = own.sheared, not plain and tables.of_strain.size > 0
     sxx, szz, sxz, pressure, sound = s.sxx, s.szz, s.sxz, s.pressure, s.sound
     work, exchanged, crushing, yield_square = s.work, s.exchanged, s.crushing, s.yield_square
     inverse_step = (sirono.TABLE_SIZE - 1) / sirono.TABLE_TOP / solid_density
@@ -148,7 +179,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     for i in range(low, high):
         rho[i] *= parts.exponential(-dt * (lxx[i] + lzz[i] + hoops * vr[i] / r[i] + exchange[i]))
     for i in range(low, high):
-        compressive[i], tensile[i] = sirono.look_up(tables, rho[i] * inverse_step)
+        compressive[i], tensile[i] = sirono.look_up(tables.strengths, rho[i] * inverse_step)
         yield_square[i] = shear_factor * shear_factor * compressive[i] * tensile[i]
     for i in range(low, high):
         hoop = hoops * vr[i] / r[i]
@@ -160,6 +191,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         p_old, sxx_old, szz_old, sxz_old = pressure[i], sxx[i], szz[i], sxz[i]
         if not plain and div < 0.0:
             strength *= parts.strengthen(-div, constants.rate)
+        if strained:
+            strength *= look_up_strain(tables.of_strain, sheared[i])
         x = phi_zero[i]
         k = k0 * sirono.raise_to(x * (1.0 / 0.15), gamma, plain)
         trial = k * (phi / x - 1.0)
@@ -176,6 +209,10 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         exx, ezz, exz, spin = parts.find_strain_rates(lxx[i], lzz[i], lxz[i], lzx[i], div)
         a, c, b = parts.shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
         limit2 = shear_factor * shear_factor * strength * tension
+        if strained:
+            limit2 *= look_up_strain(tables.shear_of_strain, sheared[i]) ** 2
+            beyond = math.sqrt(parts.measure_shear(a, c, b)) - math.sqrt(limit2)
+            sheared[i] += max(beyond, 0.0) / (3.0 * shear)
         a, c, b = parts.return_radially(a, c, b, limit2)
         if not plain:  # one array more and the loop would not be vectorised
             yield_square[i] = limit2

@@ -1,0 +1,83 @@
+"""What a law that nobody listed should be called: the place and the formulas that are right for what a campaign hides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from labsim.effects.terms import list_terms
+
+SMALL, LARGE = 0.5e-3, 1.0e-3  # m, tips of the films
+PIXEL = 20e-6  # m, of the smaller one's
+AREA = math.pi * SMALL**2
+STRENGTH, SPEED, DEPTH, SIZE = "strength", "force of speed", "force of depth", "strength of size"
+MASS, SAMPLE, CAMERA = "mass", "sample", "camera"
+CAMERA_TERMS = ("clock of row", "clock of time")
+# words of a free law without a formula -> where that is
+BLOCKS = {
+    "undisturbed dust": SAMPLE,
+    "depth and speed and undisturbed dust": SAMPLE,
+    "size": SIZE,
+}
+
+
+@dataclass(frozen=True)
+class HiddenLaw:
+    """places : any of them is right; terms : formulas that have its form, with their coefficient where that is known."""
+
+    places: tuple[str, ...]
+    terms: dict[str, float | None]
+
+    @property
+    def own(self) -> tuple[str, float] | None:
+        """The term that it is, and its coefficient."""
+        return next(((name, size) for name, size in self.terms.items() if size is not None), None)
+
+
+def find_place(term: str) -> str:
+    """Where a term acts, in the words of this page."""
+    place = list_terms()[term].place
+    if place in CAMERA_TERMS:
+        return CAMERA
+    if place == "mass of depth":
+        return MASS
+    return STRENGTH if place.startswith(("strength of f", "strength of p", "shear")) else place
+
+
+def find_law(truth: dict) -> HiddenLaw | None:
+    """Of one campaign's truth; none where a cause of the catalogue is hidden."""
+    forces, dust, measure = truth["dyn"], truth["mat"], truth["measure"]
+    profile = (truth["profile"] or {}).get("kind")
+    films: dict[str, float | None] = dict.fromkeys(("surface_layer", "film_at_0_5", "thick_surface_layer"))
+    damage: dict[str, float | None] = dict.fromkeys(("shear_damage", "slow_shear_damage", "shear_softening"))
+    if "inertial" in forces:
+        return HiddenLaw((SPEED,), {"inertial_drag": forces["inertial"] / AREA})
+    if "viscous" in forces:
+        return HiddenLaw((SPEED,), {"viscous_drag": forces["viscous"] / AREA})
+    if "shaft_drag" in forces:  # goes with depth times the square of the speed
+        return HiddenLaw((SPEED, DEPTH), {"inertial_drag": None, "depth_spring": None})
+    if "pull" in forces:
+        return HiddenLaw((DEPTH,), {"constant_pressure": None})  # a force that does not grow with the tip
+    if "film" in forces:
+        return HiddenLaw((DEPTH,), films)
+    if "gathered" in forces or "accrete" in forces:
+        return HiddenLaw((MASS,), {"stuck_mass": forces.get("gathered", forces.get("accrete"))})
+    if "interface" in dust:
+        return HiddenLaw((DEPTH, SAMPLE), films)
+    if profile == "layers":
+        return HiddenLaw((DEPTH, SAMPLE), {})
+    if truth.get("small_strength"):
+        share = math.log(truth["small_strength"])
+        curved = share / (1e-3 / SMALL - 1e-3 / LARGE)
+        return HiddenLaw((SIZE,), {"size_power": share / math.log(SMALL / LARGE), "size_curvature": curved})
+    if "weakening" in dust:
+        return HiddenLaw((STRENGTH,), damage)
+    if "hardening" in dust:
+        return HiddenLaw((STRENGTH,), {"shear_hardening": dust["hardening"]})
+    if "wobble" in measure:
+        return HiddenLaw((CAMERA,), {})
+    if "line_time" in measure:
+        return HiddenLaw((CAMERA,), {"rolling_shutter": 1e6 * measure["line_time"]})
+    if "clock_drift" in measure:  # a share by the end of each film
+        return HiddenLaw((CAMERA,), {"clock_drift": None})
+    return None
