@@ -85,10 +85,11 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
             stress = [find_strengths(phi, truth.law)[kind == "tension"] for phi in ROWS[kind]]
             labelled.write_test(folder / "strength" / kind, kind, ROWS[kind], np.array(stress), sigma, beside)
         nominal_dust = Dust()
+        how = "before a camera" if hidden.get("film") == "alone" else "with an accelerometer"
         labelled.write_sample(
             folder,
             name,
-            "Drops of rods with an accelerometer into dust, on a Lagrangian mesh",
+            f"Drops of rods {how} into dust, on a Lagrangian mesh",
             nominal_dust,
             nominal_dust.filling_factor,
             nominal_dust.solid,

@@ -39,6 +39,7 @@ from .figures.published import (
     draw_penetration,
 )
 from .figures.runs import draw_density_field
+from .figures.strengths import draw_tests, find_tests
 from .pages.campaign import write_calibration_page, write_campaign_page
 from .pages.drop_views import DropView, list_fits, list_posteriors, view_drops
 from .pages.map_views import MapView, measure_maps, view_maps
@@ -196,6 +197,9 @@ def _draw_fits(
     maps = measure_maps(found.campaign, view_maps(found.bench, fits))
     if maps:
         figures.draw_maps(maps, folder / "maps.png")
+    (folder / "tests.png").unlink(missing_ok=True)
+    if find_tests(found.bench, [])[0]:
+        draw_tests(found.bench, fits, folder / "tests.png")
     if found.bench.undisturbed:
         figures.draw_undisturbed(found.bench, folder / "undisturbed.png")
     return views, maps

@@ -15,7 +15,9 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle
 
 from ...diagnosis.campaign import Diagnosis
+from ...inference.fits.fitting import Fit
 from ...inference.fits.posterior import Posterior
+from ...inference.observations.static_tests import StaticTests
 from ...inference.workbench import Workbench
 from ...records import FloatArray
 from ..pages.drop_views import DropView
@@ -80,27 +82,43 @@ def lay_drops(views: Sequence[DropView], figure: Figure) -> list[tuple[Axes, Axe
 
 
 def choose_decisive(
-    bench: Workbench, views: Sequence[DropView], folder: Path, cause: Sequence[str]
+    bench: Workbench,
+    views: Sequence[DropView],
+    folder: Path,
+    cause: Sequence[str],
+    fits: Sequence[tuple[str, Fit]] = (),
 ) -> tuple[str, str]:
     """Name and caption of the picture beside a verdict: of the undisturbed dust where the cause is one of the sample and a scan
-    shows it, else of the drop in which the models part most (of one model the deepest), which is drawn."""
+    shows it, of the static tests where the fits part more in them than in the drops, else of the drop in which the models part
+    most (of one model the deepest), which is drawn."""
     kinds = {bench.effects[name].kind for name in cause if name in bench.effects}
     if kinds == {"sample"} and bench.undisturbed:
         return "undisturbed", "Undisturbed dust: its filling factor against depth, as the scans show it."
-    fits = list(views[0].simulated)
+    of_tests = [k for k, each in enumerate(bench.observations) if isinstance(each, StaticTests)]
+    if len(fits) > 1 and of_tests:
+        before, after = (fit for _, fit in fits[:2])
+        gains = [
+            one.chi_square - other.chi_square for one, other in zip(before.blocks, after.blocks, strict=True)
+        ]
+        if gains[of_tests[0]] > gains[0]:
+            return (
+                "tests",
+                "Static tests, in which the two part most: stress measured, and by the law of each fit.",
+            )
+    labels = list(views[0].simulated)
 
     def part(view: DropView) -> float:
-        if len(fits) == 1:
+        if len(labels) == 1:
             return view.at_stop()
-        before, after = (np.sum((view.left(fit) / view.allowed) ** 2) for fit in fits[:2])
+        before, after = (np.sum((view.left(fit) / view.allowed) ** 2) for fit in labels[:2])
         return float(before - after)
 
     shown = max(views, key=part)
     draw_drops([shown], folder / "decisive.png")
     models = " and ".join(
-        "with " + fit.replace("_", " ") if fit != "nominal" else "as stated" for fit in fits
+        "with " + fit.replace("_", " ") if fit != "nominal" else "as stated" for fit in labels
     )
-    which = "in which the two part most" if len(fits) > 1 else "that goes deepest"
+    which = "in which the two part most" if len(labels) > 1 else "that goes deepest"
     seen = f"{shown.name}, the drop {which}: measured, and simulated {models}"
     return "decisive", f"{seen}; below, what is left, and what a true model may leave."
 

@@ -9,7 +9,7 @@ from typing import Any
 from ...diagnosis.campaign import Diagnosis
 from ...diagnosis.next_experiment import Suggestion
 from ...inference.calibrate import Calibration
-from ...inference.fits.fitting import DOUBTFUL
+from ...inference.fits.fitting import DOUBTFUL, Fit
 from ...inference.fits.posterior import Posterior
 from ...inference.workbench import Workbench
 from ...records import Campaign
@@ -20,7 +20,7 @@ from ..figures.laws import plot_law
 from ..provenance import trace_origin
 from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
 from .cause_words import BADGES, describe_causes, describe_gain, describe_untestable, list_confusable
-from .drop_views import DropView, list_posteriors
+from .drop_views import DropView, list_fits, list_posteriors
 from .law_words import comes_nearest, describe_laws, size_of_missing
 from .map_views import MapView
 from .map_words import describe_maps
@@ -37,6 +37,7 @@ PICTURES = {
     "posterior": "Posterior density of p_m.",
     "corner": "Posterior, every parameter against every other.",
     "law": "The free law of an unknown cause with the band that holds 68 %, a panel a law.",
+    "tests": "Static tests: stress against filling factor, measured and by the law of each fit.",
     "undisturbed": "Filling factor of undisturbed dust against depth.",
 }
 
@@ -112,6 +113,7 @@ def write_campaign_page(
         ),
         diagnosed=True,
         cause=found.verdict.probabilities[0][0],
+        fits=list_fits(found),
         causes=causes,
         laws=laws,
         confusable=confusable,
@@ -218,6 +220,7 @@ def _write(
     runs: tuple[int, int, float],
     diagnosed: bool,
     cause: Sequence[str] = (),
+    fits: Sequence[tuple[str, Fit]] = (),
     **values: Any,
 ) -> Path:
     contents = [
@@ -234,9 +237,11 @@ def _write(
             ("gain", "Gain"),
             ("next", "Next experiment"),
         ]
+    if (folder / "tests.png").is_file():
+        contents.insert(3, ("tests", "Static tests"))
     contents += [("numerics", "Numerical error"), ("warnings", "Warnings"), ("made", "Versions and hashes")]
     notes = {"drops": str(len(views)), "warnings": str(len(warnings)) if warnings else ""}
-    shown, decisive = choose_decisive(bench, views, folder, cause)
+    shown, decisive = choose_decisive(bench, views, folder, cause, fits)
     pictures = {name: read_picture(folder / f"{name}.png", text) for name, text in PICTURES.items()}
     return write_html(
         folder / "report.html",

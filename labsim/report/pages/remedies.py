@@ -11,8 +11,9 @@ from ...diagnosis.next_experiment import Suggestion
 from .phrases import say_hypothesis
 
 KEEP = "keep it in the model: labsim simulate --model model.toml"
+CHECK = ". Another measurement of the material would check it, such as a static strength test"
 BY_KIND = {
-    "material": f"{KEEP}. Another measurement of the material would check it, such as a static strength test",
+    "material": KEEP,
     "sample": f"prepare the sample anew, or {KEEP}",
     "contact": KEEP,
     "projectile": KEEP,
@@ -47,5 +48,7 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
         if effect.amplitudes:
             parameter = f"{name}.{effect.amplitudes[0].name}"
             value = float(np.median(found.posterior_extended.samples(parameter)))
-        said.append(effect.remedy.format(value=value) if effect.remedy else BY_KIND[effect.kind])
+        advice = effect.remedy.format(value=value) if effect.remedy else BY_KIND[effect.kind]
+        untested = effect.kind == "material" and not effect.remedy and not found.campaign.strength_tests
+        said.append(advice + CHECK * untested)
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in dict.fromkeys(said))
