@@ -3,10 +3,10 @@
     OMP_NUM_THREADS=1 python -m benchmarks.accuracy.hide_and_find [--seed 20261121] [--workers 2] [--store FOLDER]
 
 The campaigns are seven drops of two rods and the undisturbed dust of two scans, made by labsim's own solver at a/dx = 6 with
-noise, scatter and nuisances (labsim.inference.truths.synthetic) and judged at 5: one holds nothing, one each an effect of the
+noise, scatter and nuisances (benchmarks.truths.measured) and judged at 5: one holds nothing, one each an effect of the
 material, the sample, the contact and the measurement, one an effect that costs runs and one of the measurement together, one a
 cause in no catalogue. Everything is drawn from the seed: today's date unless --seed repeats another. Strengths are 12 to 20
-standard deviations of what the best nominal fit leaves in a campaign without noise (labsim.inference.truths.strength), of each
+standard deviations of what the best nominal fit leaves in a campaign without noise (benchmarks.truths.strength), of each
 effect alone. Pairs are such that no single effect's fingerprint is alike (|cosine| > 0.9) to that of the two together.
 
 Found is: none where nothing was hidden; the effect, or one alike to it in this campaign, first; a pair first whose two are, one
@@ -31,11 +31,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.accuracy.own_campaigns import MIDDLE, NOT_HIDDEN, SPREAD, judge_hidden, open_campaign
+from benchmarks.truths.measured import LABORATORY, QUIET, measure_hidden
+from benchmarks.truths.strength import Found, StrengthCount
+from benchmarks.truths.table import Hidden, TruthTable
 from labsim.diagnosis.screen import CONFUSABLE, screen
 from labsim.inference.calibrate import prepare
-from labsim.inference.truths.strength import Found, StrengthCount
-from labsim.inference.truths.synthetic import LABORATORY, QUIET, measure_hidden
-from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.records import Campaign, FloatArray
 from labsim.runs.store import RunStore
 

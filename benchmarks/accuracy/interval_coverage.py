@@ -2,7 +2,7 @@
 
     python -m benchmarks.accuracy.interval_coverage OUT [--campaigns 60] [--samples 0.02] [--workers 2]
 
-Every campaign has 15 drops of four projectiles and two maps, with every nuisance that labsim.inference.truths.synthetic knows,
+Every campaign has 15 drops of four projectiles and two maps, with every nuisance that benchmarks.truths.measured knows,
 and a p_m of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. Prints coverage and the goodness of fit.
 """
 
@@ -17,11 +17,11 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.accuracy.own_campaigns import append_rows, interval, open_campaign, read_rows
+from benchmarks.truths.measured import LABORATORY, measure_hidden
+from benchmarks.truths.table import Hidden, TruthTable
 from labsim.inference.calibrate import prepare, sample_fit
 from labsim.inference.fits.fitting import goodness_of_fit
 from labsim.inference.scatter import allow_scatter
-from labsim.inference.truths.synthetic import LABORATORY, measure_hidden
-from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.records import Campaign
 from labsim.runs.store import RunStore
 

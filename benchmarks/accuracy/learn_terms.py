@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.accuracy.own_campaigns import STANDARD, open_campaign
+from benchmarks.truths.measured import LABORATORY, Hidden, TruthTable, measure_hidden
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.effects.law_places import LAW_PLACES
-from labsim.inference.truths.synthetic import LABORATORY, Hidden, TruthTable, measure_hidden
 from labsim.report.pages.law_words import describe_learned
 from labsim.runs.store import RunStore
 

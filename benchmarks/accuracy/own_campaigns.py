@@ -6,7 +6,7 @@
 Writes OUT/strengths.json, what is hidden, and OUT/rows.jsonl, one line a campaign; a second call goes on where the first
 stopped. Prints false alarms and coverage on the nulls, exact and class hit rates per strength, p_m coverage with the extension, a
 reliability table of the probabilities. --plan stops after the strengths. The strength of an effect is what the best nominal fit
-leaves of it in a campaign without noise (labsim.inference.truths.strength), in standard deviations; every draw takes the other
+leaves of it in a campaign without noise (benchmarks.truths.strength), in standard deviations; every draw takes the other
 side of null where it has two. OMP_NUM_THREADS=1 keeps the workers out of each other's way.
 """
 
@@ -28,6 +28,9 @@ import pandas as pd
 from scipy.stats import beta
 
 from benchmarks.accuracy.blind import name_hypothesis
+from benchmarks.truths.measured import LABORATORY, measure_hidden
+from benchmarks.truths.strength import Found, Search, StrengthCount
+from benchmarks.truths.table import Hidden, TruthTable
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import ReducedScan, reduce_scan
 from labsim.diagnosis.average import average_p_m
@@ -36,9 +39,6 @@ from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.fitting import goodness_of_fit
-from labsim.inference.truths.strength import Found, Search, StrengthCount
-from labsim.inference.truths.synthetic import LABORATORY, measure_hidden
-from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 from labsim.runs.store import RunStore
 

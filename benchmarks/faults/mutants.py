@@ -147,11 +147,11 @@ def write_sound(home: Path) -> None:
     import tifffile
     from campaign_files import write_scan_of
 
-    from labsim.ct.phantom import Phantom
+    from benchmarks.truths.phantom import Phantom
+    from benchmarks.truths.video import Recording, fall_and_stop, render, write_video
     from labsim.records import Material, Projectile
     from labsim.runs.store import RunStore, require_runs
     from labsim.sph import DropSetting
-    from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 
     copy_campaign(home / "campaign")
     write_test(copy_campaign(home / "static"), make_test("compression_omnidirectional", 1))

@@ -24,9 +24,9 @@ import numpy as np
 import tifffile
 from scipy import ndimage
 
+from benchmarks.truths.phantom import Phantom
 from labsim.campaign import read_scan
 from labsim.ct import compress, reduce_scan
-from labsim.ct.phantom import Phantom
 from labsim.errors import LabsimError
 from labsim.records import Scan
 

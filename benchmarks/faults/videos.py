@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render, write_video
 from labsim.errors import LabsimError
 from labsim.records import Camera, Track
 from labsim.video import Frames, fit_deceleration, follow_projectile, open_frames
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
 
 Disturb = Callable[[int, np.ndarray], np.ndarray]
 COUNT, CONTACT, SEED, PIXEL, RATE = 90, 45.5, 1, 20e-6, 1e4

@@ -7,8 +7,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from benchmarks.truths.phantom import Phantom
 from labsim.ct import reduce_scan
-from labsim.ct.phantom import Phantom
 
 
 def main() -> None:

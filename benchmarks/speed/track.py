@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render
 from labsim.video import follow_projectile
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 
 
 def main() -> None:

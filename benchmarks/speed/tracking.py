@@ -17,8 +17,8 @@ import warnings
 import cv2
 import numpy as np
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render
 from labsim.video import follow_projectile
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 
 
 def main() -> None:

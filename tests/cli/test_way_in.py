@@ -140,7 +140,7 @@ def test_what_is_wrong_with_single_drops_is_named(tmp_path: Path, capsys: pytest
 def test_dust_that_is_not_as_stated_is_seen_in_the_scan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from labsim.ct.phantom import Phantom
+    from benchmarks.truths.phantom import Phantom
 
     folder = copy_drops(P01, tmp_path / "c", ("D03",))
     phantom = Phantom(filling_factor=0.165)

@@ -1,7 +1,7 @@
 import pytest
 
+from benchmarks.truths.phantom import Phantom
 from labsim.ct import reduce_scan
-from labsim.ct.phantom import Phantom
 
 
 @pytest.fixture(scope="session")

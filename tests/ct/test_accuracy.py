@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.truths.phantom import Phantom
 from labsim.campaign import read_scan
 from labsim.ct import balance_mass, compress, count_voxels, reduce_scan
-from labsim.ct.phantom import Phantom
 from labsim.ct.slices.grey import to_filling_factor
 from labsim.errors import MeasurementError
 

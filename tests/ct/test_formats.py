@@ -10,9 +10,9 @@ import pytest
 import tifffile
 from PIL import Image
 
+from benchmarks.truths.phantom import Phantom
 from labsim.ct import open_stack, reduce_scan
 from labsim.ct.formats.images import read_image, read_rescale
-from labsim.ct.phantom import Phantom
 from labsim.ct.slices.reconstruct import (
     absorb,
     find_centre,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import tifffile
 
+from benchmarks.truths.phantom import Phantom
 from labsim.campaign import read_scan
 from labsim.ct import open_stack, reduce_scan
-from labsim.ct.phantom import Phantom
 from labsim.ct.slices.neighbours import find_bright_jumps, find_doubled
 from labsim.errors import MeasurementError
 

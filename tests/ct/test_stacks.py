@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import tifffile
 
+from benchmarks.truths.phantom import Phantom
 from labsim.campaign_scans import read_sample_alone, read_scan, read_scans
 from labsim.cli import main
 from labsim.ct import open_stack, reduce_scan
-from labsim.ct.phantom import Phantom
 from labsim.errors import CampaignError, LabsimError, MeasurementError
 from labsim.tiff_pages import count_pages
 from labsim.video import open_frames

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.truths.measured import Hidden, TruthTable, measure_hidden
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import judge_campaign
 from labsim.diagnosis.gain import predict_held_out
@@ -24,7 +25,6 @@ from labsim.effects.terms import list_terms
 from labsim.inference.fits.blocks import Block, solve_globals
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
-from labsim.inference.truths.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.runs.store import RunStore
 from labsim.sph import DropSetting
 from labsim.sph.sirono import tabulate_strengths

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.truths.measured import Hidden, TruthTable, measure_hidden
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import judge_scatters
 from labsim.diagnosis.unlisted.hats import fit_without_runs
@@ -16,7 +17,6 @@ from labsim.effects import list_effects
 from labsim.effects.terms import list_terms
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
-from labsim.inference.truths.synthetic import Hidden, TruthTable, measure_hidden
 from labsim.runs.store import RunStore
 
 CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")

@@ -23,12 +23,12 @@ from mutations import change_bytes, change_file, change_json
 from small_campaign import copy_campaign
 
 import labsim
-from labsim.ct.phantom import Phantom
+from benchmarks.truths.phantom import Phantom
+from benchmarks.truths.video import Recording, fall_and_stop, render, write_video
 from labsim.effects import list_effects
 from labsim.records import Material, Projectile
 from labsim.runs.store import RunStore, require_runs
 from labsim.sph import DropSetting
-from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 
 TOTAL = int(os.environ.get("LABSIM_MUTANTS", "100"))
 SHARES = {

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from benchmarks.truths.video import evaluate_motion
 from labsim.effects import Instrument, LogNormal, Parameter
 from labsim.errors import ExtrapolationError
 from labsim.inference.emulation.curves import FRACTIONS, decode_depth, decode_rate, encode_run
@@ -20,7 +21,6 @@ from labsim.inference.observations.compacted_zone import Block
 from labsim.inference.observations.observe import observe_drop
 from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
-from labsim.video.synthetic import evaluate_motion
 
 
 def sine_code(depth=1e-3, stop=2e-3):

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.truths import strength
+from benchmarks.truths.measured import QUIET, measure_hidden
+from benchmarks.truths.strength import StrengthCount, hide
+from benchmarks.truths.table import Hidden, TruthTable
 from labsim.campaign import read_campaign
-from labsim.inference.truths import strength
-from labsim.inference.truths.strength import StrengthCount, hide
-from labsim.inference.truths.synthetic import QUIET, measure_hidden
-from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.truths.measured import QUIET, measure_hidden
+from benchmarks.truths.table import Hidden, TruthTable
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import reduce_scan
 from labsim.errors import SimulationError
 from labsim.inference.emulation.curves import encode_run
 from labsim.inference.observations.compacted_zone import see_dust
-from labsim.inference.truths.synthetic import QUIET, measure_hidden
-from labsim.inference.truths.truth import Hidden, TruthTable
 from labsim.sph import simulate
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.truths.phantom import Phantom
 from labsim.campaign import read_campaign
-from labsim.ct.phantom import Phantom
 from labsim.ct.reduce import reduce_scan
 from labsim.diagnosis.shapes import lay_out_shapes, shape_parameter
 from labsim.effects import list_effects

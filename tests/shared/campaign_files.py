@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from labsim.ct.phantom import Phantom
+    from benchmarks.truths.phantom import Phantom
     from labsim.records import Scan
 
 CAMPAIGN = """format = 1

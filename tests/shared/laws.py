@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from campaign_files import CAMPAIGN, DROP, fill_in, write_scan_of
 
-from labsim.ct.phantom import Phantom
+from benchmarks.truths.phantom import Phantom
 from labsim.runs.store import RunStore
 from labsim.sph import DropRun, DropSetting
 from labsim.sph.run import Particles

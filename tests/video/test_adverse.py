@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render
 from labsim.errors import MeasurementError
 from labsim.video import Tracking, follow_projectile
 from labsim.video.picture.scene import survey_scene
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 
 CONTACT, COUNT = 45.5, 90
 MOMENTS = np.arange(COUNT)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render
 from labsim.video import follow_projectile, open_frames
 from labsim.video.projectile.bead import link_fall
 from labsim.video.projectile.outline import Body
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 
 DATA = Path(__file__).parents[2] / "data" / "video"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.truths.video import evaluate_motion
 from labsim.errors import MeasurementError
 from labsim.records import Camera, Measured, Track
 from labsim.video import check_drop_height, fit_deceleration, fit_local_polynomial, read_track, write_track
 from labsim.video.motion.segments import Ending, Motion, design_motion, join_parameters
-from labsim.video.synthetic import evaluate_motion
 
 RATE, PIXEL = 10_000.0, 20e-6
 CAMERA = Camera(RATE, PIXEL, 300.0, 0.0)

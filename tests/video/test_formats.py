@@ -14,13 +14,13 @@ import pims
 import pytest
 import tifffile
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render, write_video
 from labsim.errors import LabsimError, MeasurementError
 from labsim.records import Measured
 from labsim.video import follow_projectile, measure_ruler, open_frames, scale_from_diameter
 from labsim.video.picture.noise import Noise
 from labsim.video.projectile.registration import register
 from labsim.video.projectile.template import MARGIN, Template
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
 
 DATA = Path(__file__).parents[2] / "data" / "video"
 
@@ -140,7 +140,7 @@ def test_tracking_a_long_video_stays_in_500_megabytes() -> None:
     program = """
 import resource, numpy as np
 from labsim.video import follow_projectile
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render
 pictures, _ = render(Recording(), fall_and_stop(100, 60.3, 2.5, 30.0)[0])
 frames = make_frames(pictures)
 frames.start = lambda: (pictures[i if i < 94 else 94 + i % 6].copy() for i in range(20_000))

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render
 from labsim.video import follow_projectile
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render
 
 
 @pytest.mark.parametrize(("size", "codec"), [(8, "mjpg"), (16, "h264")])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import labsim
+from benchmarks.truths.video import Recording, fall_and_stop, render, write_video
 from labsim.cli import main
-from labsim.video.synthetic import Recording, fall_and_stop, render, write_video
 
 PIXEL = 20.4e-6  # m, the true scale
 RATE = 10_000.0

@@ -7,10 +7,10 @@ import time
 import numpy as np
 import pytest
 
+from benchmarks.truths.video import evaluate_motion
 from labsim.records import Camera, Track
 from labsim.video import fit_deceleration
 from labsim.video.motion.outliers import follow_median, guess_spikes
-from labsim.video.synthetic import evaluate_motion
 
 RATE, PIXEL = 10_000.0, 20e-6
 CAMERA = Camera(RATE, PIXEL, 300.0, 0.0)

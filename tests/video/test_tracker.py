@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.truths.video import Recording, fall_and_stop, make_frames, render, write_video
 from labsim.errors import MeasurementError
 from labsim.records import Camera
 from labsim.video import fit_deceleration, follow_projectile, open_frames
 from labsim.video.picture.direction import straighten
-from labsim.video.synthetic import Recording, fall_and_stop, make_frames, render, write_video
 
 DATA = Path(__file__).parents[2] / "data" / "video"
 

@@ -10,7 +10,7 @@ import pytest
 from campaign_files import write_scan_of
 from view_pages import DROP_TOML
 
-from labsim.ct.phantom import Phantom
+from benchmarks.truths.phantom import Phantom
 
 for _needed in ("starlette", "uvicorn", "tomlkit", "httpx2"):
     pytest.importorskip(_needed)

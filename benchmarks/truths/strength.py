@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects import Effect
-from ...errors import LabsimError
-from ...records import Campaign
-from ...runs.store import RunStore
-from ..calibrate import prepare
-from .synthetic import QUIET, measure_hidden
-from .truth import Hidden, TruthTable
+from benchmarks.truths.measured import QUIET, measure_hidden
+from benchmarks.truths.table import Hidden, TruthTable
+from labsim.effects import Effect
+from labsim.errors import LabsimError
+from labsim.inference.calibrate import prepare
+from labsim.records import Campaign
+from labsim.runs.store import RunStore
 
 ROOM = 2.0  # factor on both ends of the stated range of p_m, for the fit that strengths are counted by; more costs many runs
 RATIO = 2.0  # of amplitudes simulated, powers of it times the effect's step

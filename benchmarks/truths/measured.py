@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...ct.reduce import ReducedScan
-from ...effects import Instrument, list_places
-from ...records import STANDARD_GRAVITY, Drop, Track
-from ...sph.particles import initial_filling_factor
-from ..emulation.forward import Instant, predict_depth
-from ..measure import Measurements
-from ..observations.observe import Observed, observe_drop
-from ..observations.undisturbed import UndisturbedDust
-from .truth import DRIFT, Hidden, TruthTable
+from benchmarks.truths.table import DRIFT, Hidden, TruthTable
+from labsim.ct.reduce import ReducedScan
+from labsim.effects import Instrument, list_places
+from labsim.inference.emulation.forward import Instant, predict_depth
+from labsim.inference.measure import Measurements
+from labsim.inference.observations.observe import Observed, observe_drop
+from labsim.inference.observations.undisturbed import UndisturbedDust
+from labsim.records import STANDARD_GRAVITY, Drop, Track
+from labsim.sph.particles import initial_filling_factor
 
 AFTER_STOP = 1.1  # frames kept, in stopping times
 CONTACT = 3.5e-3  # s after the first frame

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from scipy.special import erf
 
-from ..records import FloatArray
-from .frames import Frames
+from labsim.records import FloatArray
+from labsim.video.frames import Frames
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import tifffile
 from scipy.ndimage import gaussian_filter
 
-from ..records import FloatArray, GreyCalibration, Measured, Projectile, Scan
+from labsim.records import FloatArray, GreyCalibration, Measured, Projectile, Scan
 
 
 @dataclass(frozen=True)

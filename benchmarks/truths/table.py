@@ -13,17 +13,17 @@ from functools import partial
 
 import numpy as np
 
-from ...ct.reduce import ReducedScan
-from ...effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
-from ...errors import SimulationError
-from ...records import STANDARD_GRAVITY, Campaign, FloatArray, Projectile, Scan
-from ...runs.store import Progress, RunStore
-from ...sph import DropRun, DropSetting
-from ..emulation.curves import encode_run
-from ..emulation.forward import ResponseTable
-from ..emulation.grid import set_nominal_drop
-from ..emulation.nodes import place_strength
-from ..observations.compacted_zone import see_dust
+from labsim.ct.reduce import ReducedScan
+from labsim.effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
+from labsim.errors import SimulationError
+from labsim.inference.emulation.curves import encode_run
+from labsim.inference.emulation.forward import ResponseTable
+from labsim.inference.emulation.grid import set_nominal_drop
+from labsim.inference.emulation.nodes import place_strength
+from labsim.inference.observations.compacted_zone import see_dust
+from labsim.records import STANDARD_GRAVITY, Campaign, FloatArray, Projectile, Scan
+from labsim.runs.store import Progress, RunStore
+from labsim.sph import DropRun, DropSetting
 
 TRUTH_CELLS, TRUTH_SCAN_CELLS = 6, 10
 SPEED_ANCHOR, SPEED_RATIO = 0.13, 1.6

@@ -1,1 +1,0 @@
-"""Campaigns whose truth is known, by labsim's own solver, and how strong what is hidden in them is."""
