@@ -21,7 +21,7 @@ from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis,
 from ...inference.fits.settle import list_large, settle
 from ...inference.workbench import Workbench
 from ...records import FloatArray
-from ..explore import FACTORS, fit_from_strengths
+from ..explore import FACTORS, NOWHERE, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import SIZES, Marginal, Tangents, integrate
@@ -115,11 +115,12 @@ def fit_formulas(
         top = max([nominal.evidence, *(fit.evidence for fit in afar.values() if fit)])
         with suppress(LabsimError):
             afar[names] = fit_from_strengths(bench, nominal, names, top, FACTORS[1:])
-    fits = []
+    fits: list[Fit] = []
     for names, marginal in chosen:
+        top = max([nominal.evidence, *(fit.evidence for fit in fits)])
         more, *shares = (float(each) for each in marginal.coefficients)
         values = {name: share * units[name] for name, share in zip(names, shares, strict=True)}
-        found = _fit(bench, names, (log_p_m + more, values), nominal)
+        found = _fit(bench, names, (log_p_m + more, values), nominal, top - NOWHERE)
         far = afar.get(names)
         if far is not None and far.evidence > max([nominal.evidence, *(fit.evidence for fit in found)]):
             found += _fit(bench, names, (far.log_p_m, far.values), far)
@@ -184,11 +185,15 @@ def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
 
 
 def _fit(
-    bench: Workbench, names: Hypothesis, start: tuple[float, Mapping[str, float]], known: Fit
+    bench: Workbench,
+    names: Hypothesis,
+    start: tuple[float, Mapping[str, float]],
+    known: Fit,
+    least: float = -math.inf,
 ) -> list[Fit]:
-    """A formula fitted; none where its runs fail: it is no formula for this dust."""
+    """A formula fitted; none where its runs fail: it is no formula for this dust. least : as fit_hypothesis has it."""
     with suppress(LabsimError):
-        return [fit_hypothesis(bench, names, start, nuisances=known)]
+        return [fit_hypothesis(bench, names, start, nuisances=known, least=least)]
     return []
 
 
