@@ -8,7 +8,7 @@ import pytest
 from labsim.diagnosis.unlisted.free_law import Tangents, gather
 from labsim.diagnosis.unlisted.hats import STEP, USUAL, FreeLaw, find_peak, make_effect
 from labsim.diagnosis.unlisted.learned_law import (
-    MOST_SIMULATED,
+    MOST_WEIGHED,
     choose_formulas,
     share_hats,
     weigh_formulas,
@@ -73,9 +73,9 @@ def test_every_place_has_its_best_term_simulated():
     """However far behind it stands: what is weighed is linear about a p_m that may be far off."""
     ranked = weigh_formulas(made_up({"inertial_drag": 0.5, "viscous_drag": 0.2}), TERMS, UNITS, LIMITS)
     chosen = choose_formulas(ranked, TERMS)
-    assert chosen[:MOST_SIMULATED] == ranked[:MOST_SIMULATED]
+    assert chosen[:MOST_WEIGHED] == ranked[:MOST_WEIGHED]
     assert {TERMS[names[0]].place for names, _ in chosen if len(names) == 1} == {law.name for law in LAWS}
-    assert len({names for names, _ in chosen}) == len(chosen) <= MOST_SIMULATED + len(LAWS)
+    assert len({names for names, _ in chosen}) == len(chosen) <= MOST_WEIGHED + len(LAWS)
 
 
 def test_where_nothing_is_hidden_no_pair_stands_out():

@@ -21,14 +21,16 @@ from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis,
 from ...inference.fits.settle import list_large, settle
 from ...inference.workbench import Workbench
 from ...records import FloatArray
-from ..explore import FACTORS, NOWHERE, fit_from_strengths
+from ..explore import FACTORS, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import SIZES, Marginal, Tangents, integrate
 from .hats import FreeLaw, add_terms, shape_at
 from .unknown import log_mean
 
-MOST_SIMULATED = 4  # formulas, beside the best of every place
+MOST_WEIGHED = 4  # formulas that coarse runs are made of, beside the best of every place
+MOST_SIMULATED = 4  # of them, those that get as far as the best by ROUGH: ln evidence, which coarse runs give to some twenty
+ROUGH = 60.0
 MOST_SETTLED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there coarse fits led to 1610 where 1790 is to be had
@@ -82,7 +84,7 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     free, terms, units = add_terms(bench, tangents.laws)
     low, high = (math.log(p) for p in bench.campaign.p_m_range)
     chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
-    fits = fit_formulas(free, nominal, tangents.log_p_m, chosen, units)
+    fits = fit_formulas(free, nominal, [names for names, _ in chosen], units)
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -104,30 +106,27 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
 def fit_formulas(
     bench: Workbench,
     nominal: Fit,
-    log_p_m: float,
-    chosen: Sequence[tuple[Hypothesis, Marginal]],
+    chosen: Sequence[Hypothesis],
     units: Mapping[str, float],
 ) -> list[Fit]:
-    """Each with its own runs from what it was weighed at, about ``log_p_m``, and from other strengths where coarse runs say that
-    more is to be had there; best first, MOST_SETTLED of them among runs about themselves."""
-    afar: dict[Hypothesis, Fit | None] = {}
-    for names, _ in chosen:  # before there are finer runs, which coarse ones do not stand beside
-        top = max([nominal.evidence, *(fit.evidence for fit in afar.values() if fit)])
+    """Each from three strengths on coarse runs, and those that come furthest with runs of their own; best first, MOST_SETTLED of
+    them among runs about themselves."""
+    coarse: list[Fit] = []
+    for names in chosen:  # before there are finer runs, which coarse ones do not stand beside
+        top = max([nominal.evidence, *(fit.evidence for fit in coarse)])
         with suppress(LabsimError):
-            afar[names] = fit_from_strengths(bench, nominal, names, top, FACTORS[1:])
-    fits: list[Fit] = []
-    for names, marginal in chosen:
-        top = max([nominal.evidence, *(fit.evidence for fit in fits)])
-        more, *shares = (float(each) for each in marginal.coefficients)
-        values = {name: share * units[name] for name, share in zip(names, shares, strict=True)}
-        found = _fit(bench, names, (log_p_m + more, values), nominal, top - NOWHERE)
-        far = afar.get(names)
-        if far is not None and far.evidence > max([nominal.evidence, *(fit.evidence for fit in found)]):
-            found += _fit(bench, names, (far.log_p_m, far.values), far)
-        fits += sorted(found, key=lambda fit: -fit.evidence)[:1]
+            found = fit_from_strengths(bench, nominal, names, top)
+            coarse += [found] if found is not None else []
+    coarse.sort(key=lambda fit: -fit.evidence)
+    near = [fit for fit in coarse if fit.evidence > coarse[0].evidence - ROUGH]
+    fits = [
+        fit
+        for begun in near[:MOST_SIMULATED]
+        for fit in _fit(bench, begun.hypothesis, (begun.log_p_m, begun.values), begun)
+    ]
     best = max(fits, key=lambda fit: fit.evidence, default=nominal)
     if goodness_of_fit(best) < REJECTED:
-        singles = [names for names, _ in chosen if len(names) == 1 and bench.costs_runs(*names)]
+        singles = [names for names in chosen if len(names) == 1 and bench.costs_runs(*names)]
         fits = take_better(fits, fit_anew(bench, nominal, singles, units))
     fits.sort(key=lambda fit: -fit.evidence)
     for k, fit in enumerate(fits[:MOST_SETTLED]):
@@ -185,24 +184,20 @@ def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
 
 
 def _fit(
-    bench: Workbench,
-    names: Hypothesis,
-    start: tuple[float, Mapping[str, float]],
-    known: Fit,
-    least: float = -math.inf,
+    bench: Workbench, names: Hypothesis, start: tuple[float, Mapping[str, float]], known: Fit
 ) -> list[Fit]:
-    """A formula fitted; none where its runs fail: it is no formula for this dust. least : as fit_hypothesis has it."""
+    """A formula fitted; none where its runs fail: it is no formula for this dust."""
     with suppress(LabsimError):
-        return [fit_hypothesis(bench, names, start, nuisances=known, least=least)]
+        return [fit_hypothesis(bench, names, start, nuisances=known)]
     return []
 
 
 def choose_formulas(
     weighed: Sequence[tuple[Hypothesis, Marginal]], terms: Mapping[str, Term]
 ) -> list[tuple[Hypothesis, Marginal]]:
-    """Those to simulate, best first: the first MOST_SIMULATED, and the best single term of every other place. What is weighed is
+    """Those to simulate, best first: the first MOST_WEIGHED, and the best single term of every other place. What is weighed is
     linear about a p_m that may be far from the truth's, where a term of the right place stands behind pairs of wrong ones."""
-    chosen = list(weighed[:MOST_SIMULATED])
+    chosen = list(weighed[:MOST_WEIGHED])
     places = {terms[names[0]].place for names, _ in chosen if len(names) == 1}
     for names, marginal in weighed:
         if len(names) == 1 and terms[names[0]].place not in places:
