@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...effects.terms import KNOTS, Term
+from ...effects.terms import KNOTS, Term, list_terms
 from ...errors import LabsimError
 from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis, goodness_of_fit
 from ...inference.fits.settle import list_large, settle
@@ -31,6 +31,7 @@ from .unknown import log_mean
 MOST_WEIGHED = 4  # formulas that coarse runs are made of, beside the best of every place
 MOST_SIMULATED = 4  # of them, those that get as far as the best by ROUGH: ln evidence, which coarse runs give to some twenty
 ROUGH = 60.0
+MOST_SIBLINGS = 2  # of the same place as the best, likewise
 MOST_SETTLED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there coarse fits led to 1610 where 1790 is to be had
@@ -128,6 +129,7 @@ def fit_formulas(
     if goodness_of_fit(best) < REJECTED:
         singles = [names for names in chosen if len(names) == 1 and bench.costs_runs(*names)]
         fits = take_better(fits, fit_anew(bench, nominal, singles, units))
+    fits = take_better(fits, fit_siblings(bench, fits, units))
     fits.sort(key=lambda fit: -fit.evidence)
     for k, fit in enumerate(fits[:MOST_SETTLED]):
         if list_large(bench, fit):
@@ -172,6 +174,31 @@ def _start(bench: Workbench, name: str, log_p_m: float, size: float, nominal: Fi
             begin = (log_p_m, {name: size})
             return [fit_hypothesis(bench, (name,), begin, nuisances=nominal, coarse=True, iterations=0)]
     return []
+
+
+def fit_siblings(bench: Workbench, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
+    """The other terms of the place of the best single one, begun where that one ended and as large: which form a law has cannot be
+    told about a p_m that is far from the truth's."""
+    singles = [fit for fit in fits if len(fit.hypothesis) == 1]
+    if not singles:
+        return []
+    best = max(singles, key=lambda fit: fit.evidence)
+    (own,) = best.hypothesis
+    place, size = list_terms()[own].place, best.values[own] / units[own]
+    tried = {fit.hypothesis for fit in fits}
+    coarse = []
+    for name in units:
+        if list_terms()[name].place == place and (name,) not in tried:
+            with suppress(LabsimError):
+                begin = (best.log_p_m, {name: size * units[name]})
+                coarse.append(fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=best))
+    coarse.sort(key=lambda fit: -fit.evidence)
+    near = [fit for fit in coarse if fit.evidence > coarse[0].evidence - ROUGH]
+    return [
+        fit
+        for each in near[:MOST_SIBLINGS]
+        for fit in _fit(bench, each.hypothesis, (each.log_p_m, each.values), each)
+    ]
 
 
 def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
