@@ -177,8 +177,8 @@ def _start(bench: Workbench, name: str, log_p_m: float, size: float, nominal: Fi
 
 
 def fit_siblings(bench: Workbench, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
-    """The other terms of the place of the best single one, begun where that one ended and as large: which form a law has cannot be
-    told about a p_m that is far from the truth's."""
+    """The other terms of the place of the best single one, begun where that one ended and as large: which form a law has cannot
+    be told about a p_m that is far from the truth's."""
     singles = [fit for fit in fits if len(fit.hypothesis) == 1]
     if not singles:
         return []
