@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ import pytest
 from benchmarks.truths.measured import Hidden, TruthTable, measure_hidden
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import judge_scatters
+from labsim.diagnosis.unlisted import hats
 from labsim.diagnosis.unlisted.hats import fit_without_runs
 from labsim.effects import list_effects
 from labsim.effects.terms import list_terms
+from labsim.errors import ExtrapolationError
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.open_workbench import open_workbench
 from labsim.runs.store import RunStore
@@ -28,7 +31,7 @@ from labsim.effects.terms import list_terms, {verb}_term
 
 title = "hidden"
 kind = "{kind}"
-parameters = (Parameter("size", "1", null=0.0, limits=(-1, 1), prior=Uniform(-1, 1), step=0.5, text="Of a term."),)
+parameters = (Parameter("size", "1", null=0.0, limits=(-9, 9), prior=Uniform(-9, 9), step=0.5, text="Of a term."),)
 leaves = "What no listed cause leaves."
 references = ("None",)
 expect = {{}}
@@ -73,3 +76,17 @@ def test_a_hidden_one_is_unknown_and_has_its_size(term, size, words, shared_stor
     fit = fit_without_runs(found.bench, found.nominal)[term]
     assert abs(fit.values[term] - size) < 3 * math.sqrt(fit.covariance[1, 1]) < 0.3 * size
     assert term not in found.bench.effects
+
+
+def test_a_term_whose_fit_leaves_the_runs_is_left_out(monkeypatch):
+    """The others are compared all the same."""
+
+    def fit(bench, names, start, **how):
+        if names == ("clock_drift",):
+            raise ExtrapolationError("simulation", "runs", "extrapolate")
+        return names
+
+    terms = {name: list_terms()[name] for name in ("clock_drift", "rolling_shutter")}
+    monkeypatch.setattr(hats, "add_terms", lambda bench: (bench, terms, {}))
+    monkeypatch.setattr(hats, "fit_hypothesis", fit)
+    assert list(fit_without_runs(None, SimpleNamespace(log_p_m=7.0))) == ["rolling_shutter"]

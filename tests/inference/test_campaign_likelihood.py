@@ -218,6 +218,13 @@ def test_a_hard_stop_loses_no_frame():
         assert observed.rejected == 2
 
 
+def test_globals_of_which_the_data_say_nothing_are_an_extrapolation():
+    """A trial step may go where the simulated drop hardly moves; it is given up as every other that leaves the runs."""
+    block = Block(np.ones(4), np.eye(4), {"ln_p_m": np.zeros(4)}, np.zeros(4))
+    with pytest.raises(ExtrapolationError, match="p_m"):
+        solve_globals([block], ["ln_p_m"], {})
+
+
 def test_globals_are_generalised_least_squares():
     rng = np.random.default_rng(5)
     root = rng.standard_normal((30, 30))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -18,6 +19,7 @@ from ...effects import Effect, Instrument, Normal, Parameter, Place
 from ...effects.contract import ChangeSetting
 from ...effects.law_places import LAW_PLACES, Knots, LawPlace
 from ...effects.terms import KNOTS, Term, add_term, list_terms, see_term
+from ...errors import ExtrapolationError
 from ...inference.fits.fitting import Fit, fit_hypothesis
 from ...inference.observations.compacted_zone import CompactedZones
 from ...inference.observations.drop_model import DropModel
@@ -168,9 +170,14 @@ def find_peak(term: Term, law: FreeLaw) -> float:
 
 
 def fit_without_runs(bench: Workbench, nominal: Fit) -> dict[str, Fit]:
-    """Every term that costs no runs, fitted: of the strength by the tip's radius, of the camera's clock."""
+    """Every term that costs no runs, fitted: of the strength by the tip's radius, of the camera's clock. One whose fit leaves the
+    range of the runs is left out."""
     free, terms, _ = add_terms(bench)
-    return {name: fit_hypothesis(free, (name,), (nominal.log_p_m, {}), nuisances=nominal) for name in terms}
+    fits = {}
+    for name in terms:
+        with suppress(ExtrapolationError):
+            fits[name] = fit_hypothesis(free, (name,), (nominal.log_p_m, {}), nuisances=nominal)
+    return fits
 
 
 def shape_at(term: Term, law: FreeLaw, places: FloatArray) -> FloatArray:

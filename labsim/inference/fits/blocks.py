@@ -125,7 +125,8 @@ def solve_globals(
 ) -> tuple[FloatArray, FloatArray, float, float, list[FloatArray]]:
     """Step of the globals (k,), their covariance, χ² left, ln det C, and C⁻¹ (residual - tangents step) per block.
 
-    priors: name -> (distance of the current value from the prior's middle, prior width); flat where absent.
+    priors: name -> (distance of the current value from the prior's middle, prior width); flat where absent. Raises
+    ExtrapolationError where the data say nothing of one.
     """
     information, gradient = np.zeros((len(names), len(names))), np.zeros(len(names))
     designs, log_determinant = [], 0.0
@@ -141,7 +142,12 @@ def solve_globals(
             away, width = priors[name]
             information[k, k] += 1 / width**2
             gradient[k] -= away / width**2
-    covariance = np.linalg.inv(information)
+    try:
+        covariance = np.linalg.inv(information)
+    except np.linalg.LinAlgError:
+        raise ExtrapolationError(
+            "simulation", "runs", "extrapolate to where nothing depends on p_m any more; see labsim runs"
+        ) from None
     step = covariance @ gradient
     chi_square, weighted = 0.0, []
     for block, design in zip(blocks, designs, strict=True):
