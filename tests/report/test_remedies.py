@@ -12,11 +12,12 @@ from labsim.report.pages.remedies import BY_KIND, say_remedy
 EFFECTS = list_effects()
 
 
-def find(word, probabilities, value=1.06, learned=None, named=None):
+def find(word, probabilities, value=1.06, learned=None, named=None, tests=()):
     posterior = SimpleNamespace(samples=lambda name: np.full(5, value))
     return SimpleNamespace(
         verdict=SimpleNamespace(word=word, probabilities=probabilities, named=named or probabilities[:1]),
         bench=SimpleNamespace(effects=EFFECTS),
+        campaign=SimpleNamespace(strength_tests=tests),
         posterior_extended=posterior,
         learned=learned,
     )
@@ -27,6 +28,12 @@ def test_every_effect_has_one(name):
     said = say_remedy(find("effect", [((name,), 0.99)]), [])
     assert said.endswith(".") and said[0].isupper() and "{" not in said
     assert EFFECTS[name].remedy or BY_KIND[EFFECTS[name].kind].split(":")[0].lower() in said.lower()
+
+
+def test_a_static_test_is_asked_for_only_where_there_is_none():
+    causes = [(("tensile_strength",), 0.99)]
+    assert "static strength test" in say_remedy(find("effect", causes), [])
+    assert "static strength test" not in say_remedy(find("effect", causes, tests=("a test",)), [])
 
 
 def test_a_scale_says_what_to_write():
