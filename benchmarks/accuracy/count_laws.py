@@ -18,7 +18,7 @@ from scipy.stats import norm
 
 from benchmarks.accuracy.blind import read_rows
 from benchmarks.accuracy.draw_accuracy import find_interval
-from benchmarks.accuracy.hidden_laws import BLOCKS, HiddenLaw, find_law, find_place
+from benchmarks.accuracy.hidden_laws import WHERE, HiddenLaw, find_law, find_place
 from labsim.effects.terms import list_terms
 
 MOST = 3  # formulas that are named
@@ -36,7 +36,7 @@ def find_places(row: dict) -> set[str]:
     named = {term.title: name for name, term in list_terms().items()}
     if block in named:
         return {find_place(named[block])}
-    return {"strength" if block == "strength of filling factor" else BLOCKS.get(block, block)}
+    return {WHERE.get(block, block)}
 
 
 def describe(row: dict, law: HiddenLaw) -> dict:

@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from benchmarks.campaigns.labelled import SMALL
+from benchmarks.lagrangian_mesh.film_campaigns import LARGE
 from labsim.effects.terms import list_terms
 
-SMALL, LARGE = 0.5e-3, 1.0e-3  # m, tips of the films
-PIXEL = 20e-6  # m, of the smaller one's
 AREA = math.pi * SMALL**2
 STRENGTH, SPEED, DEPTH, SIZE = "strength", "force of speed", "force of depth", "strength of size"
 MASS, SAMPLE, CAMERA = "mass", "sample", "camera"
-CAMERA_TERMS = ("clock of row", "clock of time")
-# words of a free law without a formula -> where that is
-BLOCKS = {
+# a place of a law, or the words of one without a formula -> where that is; others are their own names
+WHERE = {
+    "clock of row": CAMERA,
+    "clock of time": CAMERA,
+    "mass of depth": MASS,
+    "strength of filling factor": STRENGTH,
+    "strength of plastic strain": STRENGTH,
+    "shear strength of plastic strain": STRENGTH,
     "undisturbed dust": SAMPLE,
     "depth and speed and undisturbed dust": SAMPLE,
-    "size": SIZE,
 }
 
 
@@ -37,11 +41,7 @@ class HiddenLaw:
 def find_place(term: str) -> str:
     """Where a term acts, in the words of this page."""
     place = list_terms()[term].place
-    if place in CAMERA_TERMS:
-        return CAMERA
-    if place == "mass of depth":
-        return MASS
-    return STRENGTH if place.startswith(("strength of f", "strength of p", "shear")) else place
+    return WHERE.get(place, place)
 
 
 def find_law(truth: dict) -> HiddenLaw | None:

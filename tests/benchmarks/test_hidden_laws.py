@@ -6,7 +6,8 @@ import pytest
 from benchmarks.accuracy.count_laws import describe, find_places
 from benchmarks.accuracy.fresh import KINDS
 from benchmarks.accuracy.hidden_laws import find_law, find_place
-from benchmarks.campaigns.labelled import name_hidden
+from benchmarks.campaigns.labelled import SMALL, name_hidden
+from benchmarks.lagrangian_mesh.film_campaigns import LARGE
 from labsim.effects.terms import list_terms
 
 DRAG = {"body": {"inertial": 4e-4}}
@@ -21,6 +22,14 @@ def test_every_kind_has_a_place_and_its_formulas_exist(kind):
     law = find_law(hide(KINDS[kind](np.random.default_rng(1))))
     assert law is not None and law.places and set(law.terms) <= set(list_terms())
     assert all(find_place(name) in law.places for name, size in law.terms.items() if size is not None)
+
+
+@pytest.mark.parametrize("name", ["size_power", "size_curvature"])
+def test_a_strength_by_size_is_what_the_films_hide(name):
+    """The samples of the smaller tip have 0.8 of p_m."""
+    term, size = list_terms()[name], find_law(hide({"small_strength": 0.8})).terms[name]
+    small, large = term.shape(1e3 * np.array([SMALL, LARGE]))
+    assert np.exp(size * (small - large)) == pytest.approx(0.8)
 
 
 def test_a_listed_cause_is_no_law():

@@ -46,7 +46,8 @@ def test_a_tension_test_tells_tension_from_shear(fitted):
 def test_the_tests_are_drawn_and_decide(fitted, tmp_path):
     bench, nominal, tension, _ = fitted
     fits = [("nominal", nominal), ("tensile_strength", tension)]
-    tests, (before, after) = find_tests(bench, fits)
+    tests, blocks = find_tests(bench, fits)
+    before, after = (block.residual for block in blocks)
     assert len(tests.tests) == 2 and before.size == 31
     assert (
         abs(before[-6:].mean()) > 0.3 > 0.1 > abs(after[-6:].mean())

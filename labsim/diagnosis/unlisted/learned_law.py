@@ -118,18 +118,12 @@ def fit_formulas(
         with suppress(LabsimError):
             found = fit_from_strengths(bench, nominal, names, top)
             coarse += [found] if found is not None else []
-    coarse.sort(key=lambda fit: -fit.evidence)
-    near = [fit for fit in coarse if fit.evidence > coarse[0].evidence - ROUGH]
-    fits = [
-        fit
-        for begun in near[:MOST_SIMULATED]
-        for fit in _fit(bench, begun.hypothesis, (begun.log_p_m, begun.values), begun)
-    ]
+    fits = _refine(bench, coarse, MOST_SIMULATED)
     best = max(fits, key=lambda fit: fit.evidence, default=nominal)
     if goodness_of_fit(best) < REJECTED:
         singles = [names for names in chosen if len(names) == 1 and bench.costs_runs(*names)]
         fits = take_better(fits, fit_anew(bench, nominal, singles, units))
-    fits = take_better(fits, fit_siblings(bench, fits, units))
+    fits += fit_siblings(bench, fits, units)
     fits.sort(key=lambda fit: -fit.evidence)
     for k, fit in enumerate(fits[:MOST_SETTLED]):
         if list_large(bench, fit):
@@ -192,13 +186,7 @@ def fit_siblings(bench: Workbench, fits: Sequence[Fit], units: Mapping[str, floa
             with suppress(LabsimError):
                 begin = (best.log_p_m, {name: size * units[name]})
                 coarse.append(fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=best))
-    coarse.sort(key=lambda fit: -fit.evidence)
-    near = [fit for fit in coarse if fit.evidence > coarse[0].evidence - ROUGH]
-    return [
-        fit
-        for each in near[:MOST_SIBLINGS]
-        for fit in _fit(bench, each.hypothesis, (each.log_p_m, each.values), each)
-    ]
+    return _refine(bench, coarse, MOST_SIBLINGS)
 
 
 def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
@@ -208,6 +196,15 @@ def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
         if fit.hypothesis not in found or fit.evidence > found[fit.hypothesis].evidence:
             found[fit.hypothesis] = fit
     return list(found.values())
+
+
+def _refine(bench: Workbench, coarse: Sequence[Fit], most: int) -> list[Fit]:
+    """Those that come as far as the best of them by ROUGH, ``most`` at most, with runs of their own."""
+    top = max((fit.evidence for fit in coarse), default=0.0)
+    near = sorted((fit for fit in coarse if fit.evidence > top - ROUGH), key=lambda fit: -fit.evidence)
+    return [
+        fit for each in near[:most] for fit in _fit(bench, each.hypothesis, (each.log_p_m, each.values), each)
+    ]
 
 
 def _fit(

@@ -17,14 +17,13 @@ from matplotlib.patches import Circle
 from ...diagnosis.campaign import Diagnosis
 from ...inference.fits.fitting import Fit
 from ...inference.fits.posterior import Posterior
-from ...inference.observations.static_tests import StaticTests
 from ...inference.workbench import Workbench
 from ...records import FloatArray
 from ..pages.drop_views import DropView
 from ..pages.map_views import MapView
-from .look import BLUE, GREY, INK, ORANGE, PHI, corner_side, new_figure
+from .look import BLUE, COLOURS, GREY, INK, ORANGE, PHI, corner_side, new_figure
+from .strengths import find_tests
 
-COLOURS = (ORANGE, BLUE)  # nominal, extended
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
 P_M = "$p_\\mathrm{m}$ (kPa)"
@@ -94,13 +93,12 @@ def choose_decisive(
     kinds = {bench.effects[name].kind for name in cause if name in bench.effects}
     if kinds == {"sample"} and bench.undisturbed:
         return "undisturbed", "Undisturbed dust: its filling factor against depth, as the scans show it."
-    of_tests = [k for k, each in enumerate(bench.observations) if isinstance(each, StaticTests)]
-    if len(fits) > 1 and of_tests:
-        before, after = (fit for _, fit in fits[:2])
-        gains = [
-            one.chi_square - other.chi_square for one, other in zip(before.blocks, after.blocks, strict=True)
-        ]
-        if gains[of_tests[0]] > gains[0]:
+    _, of_tests = find_tests(bench, fits[:2])
+    if len(of_tests) > 1:
+        in_tests, in_drops = (
+            one.chi_square - other.chi_square for one, other in (of_tests, [fit.drops for _, fit in fits[:2]])
+        )
+        if in_tests > in_drops:
             return (
                 "tests",
                 "Static tests, in which the two part most: stress measured, and by the law of each fit.",

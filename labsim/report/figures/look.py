@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from .formats import further_formats
 
 INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
+COLOURS = (ORANGE, BLUE)  # nominal, extended
 # filling factor of dust, measured and simulated alike, so that pictures can be compared by eye
 PHI: dict[str, Any] = {"cmap": "viridis", "vmin": 0.12, "vmax": 0.30}
 STYLE: Any = {

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ...inference.fits.blocks import Block
 from ...inference.fits.fitting import Fit
 from ...inference.observations.static_tests import StaticTests, StrengthFit
 from ...inference.workbench import Workbench
-from ...records import Campaign, FloatArray
+from ...records import Campaign
 from ...sph.sirono import compressive_strength
-from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
-
-COLOURS = (ORANGE, BLUE)  # nominal, extended
+from .look import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
 
 LOOKS = {
     "compression_omnidirectional": ("compression from all sides", BLUE, "o"),
@@ -63,7 +62,7 @@ def draw_strength(
 
 def draw_tests(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) -> Path:
     """Static tests beside the drops, a panel a test: stress against filling factor, measured and by the law of each fit."""
-    tests, left = find_tests(bench, fits)
+    tests, blocks = find_tests(bench, fits)
     assert tests is not None
     with new_figure(path, 3.4 * len(tests.tests) + 0.6, 3.2) as figure:
         panels = figure.subplots(1, len(tests.tests), squeeze=False)[0]
@@ -75,19 +74,18 @@ def draw_tests(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) ->
             ax.errorbar(
                 phi, stress / 1e3, stress / 1e3 * test.relative_sigma, fmt="o", color=INK, ms=3.5, lw=1, label="measured"
             )  # fmt: skip
-            for (name, _), residual, colour in zip(fits, left, COLOURS, strict=False):
-                law = stress * np.exp(-residual[own])
+            for (name, _), block, colour in zip(fits, blocks, COLOURS, strict=False):
+                law = stress * np.exp(-block.residual[own])
                 ax.plot(phi[order], law[order] / 1e3, color=colour, label=name.replace("_", " "))
             ax.set(yscale="log", xlabel="filling factor φ", ylabel="stress (kPa)", title=LOOKS[test.kind][0])
         panels[0].legend()
     return path
 
 
-def find_tests(
-    bench: Workbench, fits: Sequence[tuple[str, Fit]]
-) -> tuple[StaticTests | None, list[FloatArray]]:
-    """The static tests that drops are compared with, none where there are none; ln of measured over the law's, of each fit."""
+def find_tests(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> tuple[StaticTests | None, list[Block]]:
+    """The static tests that drops are compared with, none where there are none, and what each fit says of them: its residuals are
+    ln of measured over the law's."""
     for k, observation in enumerate(bench.observations):
         if isinstance(observation, StaticTests):
-            return observation, [fit.blocks[k].residual for _, fit in fits]
+            return observation, [fit.blocks[k] for _, fit in fits]
     return None, []

@@ -24,8 +24,8 @@ from ...inference.observations.sleeve_friction import SOLVER, SleeveFriction
 from ...inference.workbench import Workbench
 from ...records import FloatArray
 from ..campaign_tables import say_calibrated, say_verdict
-from ..figures.campaign import COLOURS, draw_causes, draw_held_out, draw_p_m
-from ..figures.look import GREY, INK, new_figure
+from ..figures.campaign import draw_causes, draw_held_out, draw_p_m
+from ..figures.look import COLOURS, GREY, INK, new_figure
 from ..provenance import trace_origin
 from .cause_words import BADGES, describe_causes
 from .drop_views import list_fits, list_posteriors
