@@ -1,6 +1,6 @@
 """Large effects: what a tangent at the nominal fit cannot see because p_m has run away to make up for it.
 
-Where the nominal model fails, every effect that costs runs is fitted by Gauss-Newton on fingerprints (coarse runs), from the
+Where the nominal model fails, every effect that costs runs is fitted by Gauss-Newton on fingerprints (few runs), from the
 nominal p_m, or the end of its range, and from strengths above and below it (FACTORS), the effect's amplitude taken first
 at that strength. The best of the three replaces the tangent's word.
 """

@@ -25,6 +25,7 @@ from .emulation.grid import (
     RunGrid,
     few_positions,
     own_speeds,
+    scan_speeds,
     speed_nodes,
 )
 from .observations import Observation, RunFeatures, observe_further
@@ -43,7 +44,6 @@ from .supported import refuse_others
 from .workbench import Workbench
 
 Seen = TypeVar("Seen")
-SCAN_MARGIN = 1.06
 SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
 
 
@@ -126,7 +126,7 @@ def open_workbench(
         observations.append(SleeveFriction(tuple(sleeves)))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
-        nodes, few = _lay_out_speeds([scan.scan.speed.value for scan in scanned], SCAN_MARGIN)
+        nodes, few = scan_speeds([scan.scan.speed.value for scan in scanned])
         for scan in scanned:
             encode = partial(encode_scan_run, observed=scan)
             own = RunFeatures(len(families), ResponseTable(np.log(nodes), few), encode)

@@ -14,13 +14,7 @@ from ..effects.model import Model, make_instrument
 from ..records import Campaign, FloatArray
 from ..sph import DropSetting
 from .emulation.forward import ResponseTable
-from .emulation.grid import (
-    COARSE_CELLS,
-    Change,
-    Family,
-    Request,
-    RunGrid,
-)
+from .emulation.grid import Change, Family, Request, RunGrid, RunKey
 from .emulation.nodes import amplitude_nodes, enclosing_nodes, screening_node
 from .observations import Observation, RunFeatures
 from .observations.compacted_zone import CompactedZone, CompactedZones
@@ -51,8 +45,8 @@ class Workbench:
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
     model: Model | None = None  # what the nominal model is extended by
     # what the tables hold already, and codes of the nominal model: encoding a run means seeing it through every scan
-    _filled: set[tuple[int, float, str, int | None]] = field(default_factory=set, repr=False)
-    _plain: dict[tuple[int, float, int | None], list[tuple[ResponseTable, FloatArray | None]]] = field(
+    _filled: set[RunKey] = field(default_factory=set, repr=False)
+    _plain: dict[RunKey, list[tuple[ResponseTable, FloatArray | None]]] = field(
         default_factory=dict, repr=False
     )
 
@@ -94,12 +88,10 @@ class Workbench:
         """What all observations take of runs."""
         return [each for observation in self.observations for each in observation.features]
 
-    def _encode(
-        self, number: int, index: float, variant: str, cells: int | None
-    ) -> list[tuple[ResponseTable, FloatArray | None]]:
+    def _encode(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of one family, (speeds, spacings, m), for each table that rests on them; None where a run failed."""
-        runs = self.grid.stopped_runs(variant, index, cells, number)
-        alike = len(self.families[number].spacings(cells, 0, variant != ""))
+        runs = self.grid.stopped_runs(request, number)
+        alike = len(self.families[number].spacings(request.few, 0, request.variant != ""))
 
         def encode(each: RunFeatures) -> FloatArray | None:
             if runs is None:
@@ -109,37 +101,37 @@ class Workbench:
 
         return [(each.table, encode(each)) for each in self.features if each.family == number]
 
-    def _encode_plain(
-        self, number: int, index: float, cells: int | None
-    ) -> list[tuple[ResponseTable, FloatArray | None]]:
+    def _encode_plain(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the nominal model, encoded once."""
-        if (number, index, cells) not in self._plain:
-            self._plain[number, index, cells] = self._encode(number, index, "", cells)
-        return self._plain[number, index, cells]
+        key = request.of(number)
+        if key not in self._plain:
+            self._plain[key] = self._encode(number, request)
+        return self._plain[key]
 
     def _fill_base(self, number: int, index: float) -> None:
-        for table, codes in self._encode_plain(number, index, None):
+        for table, codes in self._encode_plain(number, Request("", None, index)):
             if codes is not None:
                 table.base[index] = codes.mean(axis=1)
 
-    def _fill_change(self, number: int, index: float, name: str, amplitude: float, cells: int | None) -> None:
-        variant = self._variant(name, amplitude)
-        if (number, index, variant, cells) in self._filled:
+    def _fill_change(
+        self, number: int, request: Request, plain: Request, name: str, amplitude: float
+    ) -> None:
+        if request.of(number) in self._filled:
             return
-        self._filled.add((number, index, variant, cells))
-        before, after = self._encode_plain(number, index, cells), self._encode(number, index, variant, cells)
+        self._filled.add(request.of(number))
+        before, after = self._encode_plain(number, plain), self._encode(number, request)
         spacings = self.families[number].spacings  # a change is one from the run of the same spacing
-        for (table, codes), (_, plain) in zip(after, before, strict=True):
-            kept = table.changes if cells is None else table.fingerprints
-            entry = kept.setdefault(name, {}).setdefault(index, {})
+        for (table, codes), (_, codes_before) in zip(after, before, strict=True):
+            kept = table.fingerprints if request.few else table.changes
+            entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
-            if codes is not None and plain is not None:
+            if codes is not None and codes_before is not None:
                 own = [
-                    spacings(cells, k, False).index(f)
+                    spacings(request.few, k, False).index(f)
                     for k in range(len(codes))
-                    for f in spacings(cells, k, True)
+                    for f in spacings(request.few, k, True)
                 ]
-                alike = np.take_along_axis(plain, np.reshape(own, (len(codes), -1, 1)), axis=1)
+                alike = np.take_along_axis(codes_before, np.reshape(own, (len(codes), -1, 1)), axis=1)
                 entry[amplitude] = (codes - alike).mean(axis=1)
 
     def state(self, family: Family, name: str = "") -> DropSetting:
@@ -188,7 +180,7 @@ class Workbench:
         return f"{self.renamed.get(name, name)} {amplitude:.9g}"
 
     def require_base(self, indices: Sequence[float]) -> None:
-        self.grid.require([Request("", None, index, None) for index in indices], "nominal model")
+        self.grid.require([Request("", None, index) for index in indices], "nominal model")
         for number in range(len(self.families)):
             for index in indices:
                 self._fill_base(number, index)
@@ -197,21 +189,24 @@ class Workbench:
         self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step))
 
     def require_changes(
-        self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, coarse: bool = False
+        self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, few: bool = False
     ) -> None:
-        """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect."""
-        cells = self._coarse_cells if coarse else None
-        if cells is not None:  # no fingerprint is looked at where there are changes
+        """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect; at few
+        speeds they are fingerprints."""
+        if few:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
-        plain = [Request("", None, index, cells) for index in sorted({index for _, _, index in wanted})]
+        plain = {
+            index: Request("", None, index, few, coarse=True) for index in sorted({i for *_, i in wanted})
+        }
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, cells) for name, a, index in wanted
+            Request(self._variant(name, a), self.change(name, a), index, few, coarse=True)
+            for name, a, index in wanted
         ]
-        self.grid.require(plain + changed, text)
+        self.grid.require([*plain.values(), *changed], text)
         for number in range(len(self.families)):
-            for name, amplitude, index in wanted:
-                self._fill_change(number, index, name, amplitude, cells)
+            for (name, amplitude, index), request in zip(wanted, changed, strict=True):
+                self._fill_change(number, request, plain[index], name, amplitude)
 
     def require_fingerprints(self, names: Sequence[str], log_p_m: float, text: str) -> None:
         """The base about a strength, and what each effect changes there by one step; by a step to the other side of its null
@@ -225,18 +220,11 @@ class Workbench:
                 if not self._has_fingerprint(name, index)
                 for amplitude in amplitude_nodes(self._find(name), 0.0, side=side)
             ]
-            self.require_changes(wanted, text, coarse=True)
-
-    @property
-    def _coarse_cells(self) -> int | None:
-        """Spacings in a tip radius of fingerprints; None where fits themselves are as coarse, and fingerprints are changes."""
-        return COARSE_CELLS if self.grid.cells > COARSE_CELLS else None
+            self.require_changes(wanted, text, few=True)
 
     def _has_fingerprint(self, name: str, index: float) -> bool:
         """Whether every projectile has a run at a strength node by which an effect is known there."""
-        tables = [each.table for each in self.features]
-        kept = [table.changes if self._coarse_cells is None else table.fingerprints for table in tables]
-        return all(each.get(name, {}).get(index) for each in kept)
+        return all(each.table.fingerprints.get(name, {}).get(index) for each in self.features)
 
     def initial_setting(self, amplitudes: Mapping[str, float], name: str) -> DropSetting:
         """What would be simulated at the place of a drop or scan, for data that need no run: its initial state counts.

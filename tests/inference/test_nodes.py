@@ -130,8 +130,8 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
     tables = [ResponseTable(np.log([0.3, 0.4]), (0, 1)) for _ in range(2)]
     asked = []
 
-    def require_changes(wanted, text, *, coarse):
-        assert coarse
+    def require_changes(wanted, text, *, few):
+        assert few
         for name, amplitude, index in wanted:
             asked.append((name, np.sign(amplitude)))
             for k, table in enumerate(tables):
@@ -141,7 +141,6 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
 
     bench = SimpleNamespace(
         effects=list_effects(None),
-        _coarse_cells=4,
         features=[SimpleNamespace(table=table) for table in tables],
         require_base_about=lambda log_p_m: None,
         require_changes=require_changes,

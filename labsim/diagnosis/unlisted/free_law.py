@@ -18,6 +18,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import truncnorm
 
+from ...inference.emulation.grid import Request
 from ...inference.emulation.nodes import amplitude_nodes, place_strength
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import log_share_inside
@@ -118,7 +119,7 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
     deepest = {
         run.setting: run.penetration_depth
         for number in range(len(bench.families))
-        for run in bench.grid.stopped_runs("", index, None, number) or ()
+        for run in bench.grid.stopped_runs(Request("", None, index), number) or ()
         if not isinstance(run, Push)
     }
     hats = {name: hat for law in laws for name, hat in make_hats(law, deepest).items()}

@@ -28,8 +28,10 @@ from .free_law import SIZES, Marginal, Tangents, integrate
 from .hats import FreeLaw, add_terms, shape_at
 from .unknown import log_mean
 
-MOST_WEIGHED = 4  # formulas that coarse runs are made of, beside the best of every place
-MOST_SIMULATED = 4  # of them, those that get as far as the best by ROUGH: ln evidence, which coarse runs give to some twenty
+MOST_WEIGHED = 4  # formulas that few runs are made of, beside the best of every place
+MOST_SIMULATED = (
+    4  # of them, those that get as far as the best by ROUGH: ln evidence, which few runs give to some twenty
+)
 ROUGH = 60.0
 MOST_SIBLINGS = 2  # of the same place as the best, likewise
 MOST_SETTLED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
@@ -110,10 +112,10 @@ def fit_formulas(
     chosen: Sequence[Hypothesis],
     units: Mapping[str, float],
 ) -> list[Fit]:
-    """Each from three strengths on coarse runs, and those that come furthest with runs of their own; best first, MOST_SETTLED of
+    """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_SETTLED of
     them among runs about themselves."""
     coarse: list[Fit] = []
-    for names in chosen:  # before there are finer runs, which coarse ones do not stand beside
+    for names in chosen:  # before there are more runs, which few ones do not stand beside
         top = max([nominal.evidence, *(fit.evidence for fit in coarse)])
         with suppress(LabsimError):
             found = fit_from_strengths(bench, nominal, names, top)
@@ -136,7 +138,7 @@ def fit_anew(
     bench: Workbench, nominal: Fit, singles: Sequence[Hypothesis], units: Mapping[str, float]
 ) -> list[Fit]:
     """The terms that get furthest before p_m is moved, fitted from there."""
-    # coarse runs do not stand beside finer ones: they get names of their own
+    # few runs do not stand beside more: they get names of their own
     probes = {f"{name} anew": bench.effects[name] for (name,) in singles}
     probing = replace(bench, effects={**bench.effects, **probes})
     begun: dict[Hypothesis, list[Fit]] = {}

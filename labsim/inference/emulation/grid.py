@@ -32,7 +32,9 @@ FEWEST_SPEEDS = 3
 # alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, math.sqrt(SPEED_RATIO)
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
-COARSE_CELLS = 4  # for fingerprints: what an effect changes needs less than what it is added to
+# for what an effect changes, which needs less than what it is added to: from 4 spacings a change of the depth is as near to that
+# from 8 as it is from 5 (benchmarks/accuracy/change_spacing.py). More where fits have more than the usual, in proportion
+COARSE_CELLS = 4
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
@@ -46,17 +48,21 @@ FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
 # (benchmarks/acceleration/effect_roughness.py)
 FELT_STEPS = 4.0
-SCAN_CELLS = 8  # of scans: the map needs more than the depth does
+# of scans, and of what effects change in them: the map needs more than the depth does
+SCAN_CELLS, COARSE_SCAN_CELLS = 8, 6
+SCAN_STEP = 1.15  # from a lone scan's own speed to a second one, which says what its error does to the map
 
 Change = Callable[[DropSetting], DropSetting]
+RunKey = tuple[str, float, bool, bool, int]
 
 
 @dataclass(frozen=True)
 class Family:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
-    few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change. pushed :
-    led through the ground at these speeds, not dropped. felt : an accelerometer is on some of them.
+    few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change; of scans,
+    which have a speed of their own, all that effects change. pushed : led through the ground at these speeds, not dropped.
+    felt : an accelerometer is on some of them.
     """
 
     projectile: Projectile
@@ -66,10 +72,14 @@ class Family:
     pushed: bool = False
     felt: bool = False
 
-    def spacings(self, cells: int | None, position: int, changed: bool) -> tuple[float, ...]:
-        """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``cells``), and what
+    def positions(self, few: bool, coarse: bool) -> Sequence[int]:
+        """At which speeds a request has runs."""
+        return self.few if few or (coarse and self.is_scan) else range(len(self.speeds))
+
+    def spacings(self, few: bool, position: int, changed: bool) -> tuple[float, ...]:
+        """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``few``), and what
         is changed by a cause, have one."""
-        if not self.felt or cells is not None:
+        if not self.felt or few:
             return (1.0,)
         return (FELT_SPACINGS[position % len(FELT_SPACINGS)],) if changed else FELT_SPACINGS
 
@@ -78,13 +88,18 @@ class Family:
 class Request:
     """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    cells : spacings in a tip radius, at the few speeds that fingerprints need; None for all speeds at the base's own spacing.
+    few : at the few speeds that fingerprints need. coarse : at the spacing of what effects change, not at that of fits.
     """
 
     variant: str
     change: Change | None
     index: float
-    cells: int | None
+    few: bool = False
+    coarse: bool = False
+
+    def of(self, number: int) -> RunKey:
+        """Under what the runs of one family are kept."""
+        return self.variant, self.index, self.few, self.coarse, number
 
 
 def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
@@ -102,6 +117,23 @@ def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> t
 
 def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
     """Nodes at the speeds of drops with an accelerometer, of three digits, at least two of them."""
+    nodes = _merge_speeds(speeds)
+    if len(nodes) == 1:
+        nodes = [nodes[0] / SAME_SPEED, nodes[0] * SAME_SPEED]
+    return tuple(float(f"{node:.3g}") for node in nodes)
+
+
+def scan_speeds(speeds: Sequence[float]) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Nodes at the speeds of scans, of three digits, at least two of them; and those that effects are simulated at."""
+    nodes = _merge_speeds(speeds)
+    few = range(len(nodes))
+    if len(nodes) == 1:
+        nodes = [nodes[0], nodes[0] * SCAN_STEP]
+    return tuple(float(f"{node:.3g}") for node in nodes), tuple(few)
+
+
+def _merge_speeds(speeds: Sequence[float]) -> list[float]:
+    """One speed for all that are alike; nodes of a grid where there are many."""
     alike: list[list[float]] = []
     for speed in sorted(speeds):
         if alike and speed < SAME_SPEED * alike[-1][0]:
@@ -109,11 +141,8 @@ def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
         else:
             alike.append([speed])
     if len(alike) > MOST_SPEEDS:
-        return speed_nodes(min(speeds), max(speeds), FELT_RATIO)
-    nodes = [math.sqrt(each[0] * each[-1]) for each in alike]
-    if len(nodes) == 1:
-        nodes = [nodes[0] / SAME_SPEED, nodes[0] * SAME_SPEED]
-    return tuple(float(f"{node:.3g}") for node in nodes)
+        return list(speed_nodes(min(speeds), max(speeds), FELT_RATIO))
+    return [math.sqrt(each[0] * each[-1]) for each in alike]
 
 
 def few_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
@@ -228,7 +257,7 @@ def hasten(setting: DropSetting) -> DropSetting:
 
 @dataclass
 class RunGrid:
-    """Access to runs by (variant, p_m node, cells, family), each in the order of its speeds, and of the spacings at each."""
+    """Access to runs of a request and family, each in the order of its speeds, and of the spacings at each."""
 
     campaign: Campaign
     store: RunStore
@@ -238,12 +267,17 @@ class RunGrid:
     scheduler: str | None = None
     progress: Progress | None = None
     extension: Change | None = None  # of the nominal model, by a model.toml
-    runs: dict[tuple[str, float, int | None, int], list[AnyPart | FailedRun]] = field(default_factory=dict)
+    runs: dict[RunKey, list[AnyPart | FailedRun]] = field(default_factory=dict)
 
-    def setting(self, family: Family, speed: float, p_m: float, cells: int | None = None) -> DropSetting:
+    def setting(self, family: Family, speed: float, p_m: float, coarse: bool = False) -> DropSetting:
         """The nominal model of the campaign for one node."""
-        usual = max(self.cells, FELT_CELLS) if family.felt else cells or self.cells
-        own = SCAN_CELLS if family.is_scan else PUSH_CELLS if family.pushed else usual
+        usual = self.cells
+        if family.felt:
+            usual = max(self.cells, FELT_CELLS)
+        elif coarse:
+            usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
+        of_scan = COARSE_SCAN_CELLS if coarse else SCAN_CELLS
+        own = of_scan if family.is_scan else PUSH_CELLS if family.pushed else usual
         setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
         if family.pushed:
             setting = set_push(setting, speed)
@@ -255,18 +289,18 @@ class RunGrid:
             (request, number)
             for request in dict.fromkeys(wanted)
             for number in range(len(self.families))
-            if (request.variant, request.index, request.cells, number) not in self.runs
+            if request.of(number) not in self.runs
         ]
         settings, places = [], []
         parts: list[Part] = []
         for request, number in missing:
             family = self.families[number]
-            positions = range(len(family.speeds)) if request.cells is None else family.few
+            positions = family.positions(request.few, request.coarse)
             changed = request.variant != ""
-            laid = [(k, factor) for k in positions for factor in family.spacings(request.cells, k, changed)]
+            laid = [(k, factor) for k in positions for factor in family.spacings(request.few, k, changed)]
             for position, factor in laid:
                 setting = self.setting(
-                    family, family.speeds[position], strength_node(request.index), request.cells
+                    family, family.speeds[position], strength_node(request.index), request.coarse
                 )
                 setting = request.change(setting) if request.change is not None else setting
                 setting = setting.replace(spacing=factor * setting.spacing)
@@ -285,13 +319,11 @@ class RunGrid:
         )
         at = 0
         for request, number, count in places:
-            self.runs[request.variant, request.index, request.cells, number] = runs[at : at + count]
+            self.runs[request.of(number)] = runs[at : at + count]
             at += count
 
-    def stopped_runs(
-        self, variant: str, index: float, cells: int | None, number: int
-    ) -> list[AnyPart] | None:
+    def stopped_runs(self, request: Request, number: int) -> list[AnyPart] | None:
         """Runs of one family, in the order of its speeds and spacings, or None where one failed or never stopped."""
-        runs = self.runs[variant, index, cells, number]
+        runs = self.runs[request.of(number)]
         good = [run for run in runs if not isinstance(run, FailedRun) and run.stopped]
         return good if len(good) == len(runs) else None

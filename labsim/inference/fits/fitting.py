@@ -199,4 +199,4 @@ def _ask(
         for index in indices
     ]
     if wanted:
-        bench.require_changes(wanted, " and ".join(hypothesis), coarse=coarse)
+        bench.require_changes(wanted, " and ".join(hypothesis), few=coarse)
