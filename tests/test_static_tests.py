@@ -184,22 +184,22 @@ def test_the_command_writes_what_it_found(folder, tmp_path, capsys):
 # beside the drops
 
 
-def see(bench, values, steps):
-    (tests,) = (each for each in bench.observations if isinstance(each, StaticTests))
-    return linearise_alone(bench, tests, values, steps)
+def see(problem, values, steps):
+    (tests,) = (each for each in problem.observations if isinstance(each, StaticTests))
+    return linearise_alone(problem, tests, values, steps)
 
 
 def test_tangents_are_those_of_the_formulas(folder, tmp_path):
     for seed, kind in enumerate(("compression_omnidirectional", "tension", "shear"), start=1):
         write_test(folder, make_test(kind, seed, rows=9))
-    bench, _ = prepare(read_campaign(folder), LawStore(tmp_path / "store"), workers=1)
+    problem, _ = prepare(read_campaign(folder), LawStore(tmp_path / "store"), workers=1)
     steps = {
         "static_strength": 1e-4,
         "strength_slope": 1e-4,
         "shear_strength": 1e-4,
         "tensile_strength": 1e-4,
     }
-    block = see(bench, {}, {**steps, "sample_drift": 0.1, "filling_factor": 1e-3})
+    block = see(problem, {}, {**steps, "sample_drift": 0.1, "filling_factor": 1e-3})
     phi = np.linspace(0.14, 0.52, 9)
     of = [slice(0, 9), slice(9, 18), slice(18, 27)]
     for part, share in zip(of, (1.0, 0.0, 0.5), strict=True):
@@ -219,10 +219,10 @@ def test_tangents_are_those_of_the_formulas(folder, tmp_path):
 
 def test_expected_stresses_are_those_of_the_paper(folder, tmp_path):
     write_test(folder, make_test("shear", 1, p_m=1000.0, sigma=1e-4))
-    bench, _ = prepare(read_campaign(folder), LawStore(tmp_path / "store"), workers=1)
-    (tests,) = (each for each in bench.observations if isinstance(each, StaticTests))
+    problem, _ = prepare(read_campaign(folder), LawStore(tmp_path / "store"), workers=1)
+    (tests,) = (each for each in problem.observations if isinstance(each, StaticTests))
     phi = np.array([phi for phi, _ in tests.tests[0].points])
-    residual = see(bench, {}, {}).residual  # at ln p_m = 0
+    residual = see(problem, {}, {}).residual  # at ln p_m = 0
     assert residual == pytest.approx(
         np.log(stress("shear", phi, 1000.0) / stress("shear", phi, 1.0)), abs=1e-3
     )
@@ -232,7 +232,7 @@ def test_expected_stresses_are_those_of_the_paper(folder, tmp_path):
 def test_static_over_dynamic_strength_is_found_and_p_m_stays(folder, tmp_path, factor):
     write_test(folder, make_test("compression_omnidirectional", 1, p_m=1300.0 * factor))
     campaign, store = read_campaign(folder), LawStore(tmp_path / "store")
-    found = judge_scatters(campaign, lambda terms: prepare(campaign, store, terms=terms, workers=1))
+    found = judge_scatters(campaign, lambda budget: prepare(campaign, store, budget=budget, workers=1))
     best, probability = found.verdict.probabilities[0]
     assert best == (("none",) if factor == 1.0 else ("static_strength",))
     # a static strength below the dynamic one is what a strength that grows with the rate leaves, too
@@ -256,6 +256,6 @@ def test_calibration_keeps_both_strengths_apart(folder, tmp_path):
 def test_one_direction_alone_is_not_compared(folder, tmp_path):
     """Dust that gives way to its sides has no curve of the law."""
     write_test(folder, make_test("compression_unidirectional", 1))
-    bench, _ = prepare(read_campaign(folder), LawStore(tmp_path / "store"), workers=1)
-    assert not any(isinstance(each, StaticTests) for each in bench.observations)
-    assert "static_strength" in bench.reasons
+    problem, _ = prepare(read_campaign(folder), LawStore(tmp_path / "store"), workers=1)
+    assert not any(isinstance(each, StaticTests) for each in problem.observations)
+    assert "static_strength" in problem.reasons

@@ -24,8 +24,8 @@ from labsim.inference.emulation.curves import decode_speed
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.observations import RunFeatures
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
-from labsim.inference.scatter import set_terms
-from labsim.inference.workbench import Workbench
+from labsim.inference.problem import Problem
+from labsim.inference.scatter import set_error_budget
 from labsim.runs.parts import Motion
 from labsim.runs.store import RunStore
 
@@ -43,19 +43,19 @@ SPACINGS = np.linspace(7.6, 8.4, 9)  # in a tip radius; the middle one is FELT_C
 
 
 def simulate_at(
-    bench: Workbench, features: Mapping[str, RunFeatures], speeds: Mapping[str, float]
+    problem: Problem, features: Mapping[str, RunFeatures], speeds: Mapping[str, float]
 ) -> dict[tuple[str, str], np.ndarray]:
     """(cause, drop) -> codes (spacings, m) of runs at that very place."""
     keys = [(cause, drop) for cause in CAUSES for drop in speeds]
     settings = []
     for cause, drop in keys:
-        family = bench.families[features[drop].family]
-        setting = bench.grid.setting(family, speeds[drop], P_M)
+        group = problem.groups[features[drop].group]
+        setting = problem.grid.setting(group, speeds[drop], P_M)
         for name, amplitude in CAUSES[cause].items():
-            setting = bench.change(name, amplitude)(setting)
-        settings += [setting.replace(spacing=family.projectile.tip_radius / each) for each in SPACINGS]
-    runs = bench.grid.store.get_parts(
-        settings, [Motion] * len(settings), workers=bench.grid.workers, text="at the place"
+            setting = problem.change(name, amplitude)(setting)
+        settings += [setting.replace(spacing=group.projectile.tip_radius / each) for each in SPACINGS]
+    runs = problem.grid.store.get_parts(
+        settings, [Motion] * len(settings), workers=problem.grid.workers, text="at the place"
     )
     return {
         key: np.array(
@@ -83,16 +83,18 @@ def main() -> None:
     )
     parser.add_argument("--workers", type=int, default=2)
     campaign = read_campaign(CAMPAIGN)
-    bench, _ = prepare(campaign, RunStore(), workers=parser.parse_args().workers, terms=set_terms(campaign))
-    tables = {model.observed.name: model.table for model in bench.tracks.models}
+    problem, _ = prepare(
+        campaign, RunStore(), workers=parser.parse_args().workers, budget=set_error_budget(campaign)
+    )
+    tables = {model.observed.name: model.table for model in problem.tracks.models}
     features = {
-        drop: next(each for each in bench.features if each.table is table) for drop, table in tables.items()
+        drop: next(each for each in problem.features if each.table is table) for drop, table in tables.items()
     }
-    speeds = {model.observed.name: model.observed.impact_speed for model in bench.tracks.models}
+    speeds = {model.observed.name: model.observed.impact_speed for model in problem.tracks.models}
     for amplitudes in CAUSES.values():
         # runs are asked for about the place, and nothing is fitted
-        fit_hypothesis(bench, tuple(amplitudes), (np.log(P_M), amplitudes), around=True, iterations=0)
-    there = simulate_at(bench, features, speeds)
+        fit_hypothesis(problem, tuple(amplitudes), (np.log(P_M), amplitudes), around=True, iterations=0)
+    there = simulate_at(problem, features, speeds)
     between = {
         (cause, drop): tables[drop].code(np.log(P_M), np.log(speeds[drop]), CAUSES[cause])
         for cause, drop in there

@@ -21,14 +21,14 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.screen import screen
 from labsim.inference.calibrate import prepare
 from labsim.inference.emulation import grid
-from labsim.inference.scatter import set_terms
+from labsim.inference.scatter import set_error_budget
 from labsim.records import Campaign
 from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "f161"
 # spacings in a tip radius, and of how many runs the mean is taken; the first is that of fits
 RUNS = ((8, 2), (8, 1), (6, 2), (6, 1))
-USUAL = grid.Family.spacings
+USUAL = grid.ProjectileGroup.spacings
 
 
 def find_fingerprints(campaign: Campaign, spacings: int, count: int) -> tuple[dict[str, np.ndarray], float]:
@@ -37,18 +37,20 @@ def find_fingerprints(campaign: Campaign, spacings: int, count: int) -> tuple[di
     factors = tuple(
         grid.FELT_CELLS / spacings * each for each in (grid.FELT_SPACINGS if count == 2 else (1.0,))
     )
-    grid.Family.spacings = lambda family, cells, *rest: (  # type: ignore[method-assign]
-        USUAL(family, cells, *rest) if cells is None else factors
+    grid.ProjectileGroup.spacings = lambda group, cells, *rest: (  # type: ignore[method-assign]
+        USUAL(group, cells, *rest) if cells is None else factors
     )
     with tempfile.TemporaryDirectory() as folder:
-        bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
-        bench.grid.store = RunStore(Path(folder))
+        problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
+        problem.grid.store = RunStore(Path(folder))
         began = time.process_time()
-        found = screen(bench, nominal, np.random.default_rng(1))
+        found = screen(problem, nominal, np.random.default_rng(1))
         spent = time.process_time() - began
-    steps = {name: bench.effects[name].amplitudes[0].step for name in found.names}
+    steps = {name: problem.effects[name].amplitudes[0].step for name in found.names}
     simulated = [
-        name for name in found.names if bench.costs_runs(name) and bench.effects[name].kind != "numerics"
+        name
+        for name in found.names
+        if problem.affects_simulation(name) and problem.effects[name].kind != "numerics"
     ]
     return {name: steps[name] * found.fingerprints[:, found.names.index(name)] for name in simulated}, spent
 

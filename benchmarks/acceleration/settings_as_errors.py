@@ -19,27 +19,27 @@ from labsim.diagnosis.screen import screen
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.observations.acceleration_model import AccelerationModel
-from labsim.inference.scatter import set_terms
-from labsim.inference.workbench import Workbench
+from labsim.inference.problem import Problem
+from labsim.inference.scatter import set_error_budget
 from labsim.runs.store import RunStore
 
 
-def describe(bench: Workbench, nominal: Fit) -> tuple[float, float, str, float]:
-    found = screen(bench, nominal, np.random.default_rng(1))
+def describe(problem: Problem, nominal: Fit) -> tuple[float, float, str, float]:
+    found = screen(problem, nominal, np.random.default_rng(1))
     largest = max(found.scores, key=lambda score: abs(score.score))
     return nominal.evidence, nominal.chi_square, largest.name, largest.score
 
 
 def compare(folder: Path) -> tuple[tuple[float, float, str, float], tuple[float, float, str, float]]:
     campaign = read_campaign(folder)
-    bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+    problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
     models = tuple(
         replace(model, numerics={}) if isinstance(model, AccelerationModel) else model
-        for model in bench.tracks.models
+        for model in problem.tracks.models
     )
-    tracks = replace(bench.tracks, models=models)
-    bare = replace(bench, observations=(tracks, *bench.observations[1:]))
-    return describe(bare, fit_hypothesis(bare, (), (nominal.log_p_m, {}))), describe(bench, nominal)
+    tracks = replace(problem.tracks, models=models)
+    bare = replace(problem, observations=(tracks, *problem.observations[1:]))
+    return describe(bare, fit_hypothesis(bare, (), (nominal.log_p_m, {}))), describe(problem, nominal)
 
 
 if __name__ == "__main__":

@@ -33,8 +33,8 @@ from labsim.inference.fits.blocks import solve_globals
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations import acceleration_model
-from labsim.inference.scatter import set_terms
-from labsim.inference.workbench import Workbench
+from labsim.inference.problem import Problem
+from labsim.inference.scatter import set_error_budget
 from labsim.runs.store import RunStore
 
 SHARES = (0.01, 0.03, 0.1)  # of what a cause changes
@@ -50,13 +50,13 @@ def list_nulls(folders: list[Path]) -> Iterator[tuple[Path, float]]:
                 yield folder / name, truth["pm"]
 
 
-def add_evidence(fits: Sequence[tuple[Workbench, Fit]], sizes: Sequence[float]) -> float:
+def add_evidence(fits: Sequence[tuple[Problem, Fit]], sizes: Sequence[float]) -> float:
     """ln evidence of all nominal fits with these sizes, but for a constant; p_m and nuisances go to their best by one step."""
     for name, size in zip(SIZES, sizes, strict=True):
         setattr(acceleration_model, name, size)
     total = 0.0
-    for bench, fit in fits:
-        blocks = linearise_at(bench, fit.nuisances, fit.log_p_m, {})
+    for problem, fit in fits:
+        blocks = linearise_at(problem, fit.nuisances, fit.log_p_m, {})
         _, covariance, chi_square, log_determinant, _ = solve_globals(blocks, ("ln_p_m",), {})
         total += 0.5 * (math.log(covariance[0, 0]) - chi_square - log_determinant)
     return total
@@ -77,16 +77,16 @@ def show_changes(folders: list[Path]) -> None:
     less = []
     for path, cause, (log_p_m, value) in list_causes(folders):
         campaign = read_campaign(path)
-        bench, _ = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
-        if cause not in bench.effects:
+        problem, _ = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
+        if cause not in problem.effects:
             continue
-        start = {cause: value - bench.effects[cause].amplitudes[0].null}
-        fit = fit_hypothesis(bench, (cause,), (log_p_m, start), around=True)
+        start = {cause: value - problem.effects[cause].amplitudes[0].null}
+        fit = fit_hypothesis(problem, (cause,), (log_p_m, start), around=True)
         acceleration_model.AccelerationModel.changes_differ = True
         row = []
         for share in SHARES:
-            bench.terms = replace(bench.terms, numerical_change=share)
-            again = fit_hypothesis(bench, (cause,), (fit.log_p_m, fit.values), around=True, nuisances=fit)
+            problem.budget = replace(problem.budget, numerical_change=share)
+            again = fit_hypothesis(problem, (cause,), (fit.log_p_m, fit.values), around=True, nuisances=fit)
             row.append(fit.evidence - again.evidence)
         acceleration_model.AccelerationModel.changes_differ = False
         less.append(row)
@@ -110,14 +110,14 @@ def main() -> None:
     fits, laws, causes, p_values, off = [], [], [], [], []
     for path, p_m in list_nulls(asked.folders):
         campaign = read_campaign(path)
-        bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
-        fits.append((bench, nominal))
+        problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
+        fits.append((problem, nominal))
         off.append(nominal.log_p_m - math.log(p_m))
-        lay_out_shapes(bench)
-        screening = screen(bench, nominal, np.random.default_rng(1))
+        lay_out_shapes(problem)
+        screening = screen(problem, nominal, np.random.default_rng(1))
         causes.append(max(score.log_bayes for score in screening.scores))
         p_values.append(screening.p_value)
-        laws.append(fit_unknown(bench, nominal).evidence - nominal.evidence)
+        laws.append(fit_unknown(problem, nominal).evidence - nominal.evidence)
 
     show_changes(asked.folders)
     if not fits:

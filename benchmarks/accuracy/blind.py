@@ -92,8 +92,8 @@ def describe_evidence(found: Diagnosis) -> dict:
         "unknown": found.unknown.evidence - nominal,
         "block": found.unknown.block,
         "predicted": found.predicted,
-        "catalogue": list(found.bench.effects),
-        "felt": bool(found.bench.felt),
+        "catalogue": list(found.problem.effects),
+        "felt": bool(found.problem.felt),
     }
 
 
@@ -136,24 +136,26 @@ def read_hidden(truth: dict) -> dict[str, tuple[float, float | None]]:
 
 def compare_gain(found: Diagnosis, truth: dict) -> dict:
     """The gain of what is hidden, at its true strength and p_m, and the share of what that removes which the extension does."""
-    bench, hidden = found.bench, read_hidden(truth)
+    problem, hidden = found.problem, read_hidden(truth)
     law = find_law(truth)
     if law is not None and law.own is not None:
         name, size = law.own
         hidden = {name: (size, None)}
-        bench = replace(bench, effects={**bench.effects, name: make_effect(list_terms()[name], abs(size))})
-    if not hidden or any(name not in bench.effects for name in hidden):
+        problem = replace(
+            problem, effects={**problem.effects, name: make_effect(list_terms()[name], abs(size))}
+        )
+    if not hidden or any(name not in problem.effects for name in hidden):
         return {"by_truth": math.nan, "share": math.nan, "sigmas": math.nan, "rms_by_truth": math.nan}
     amplitudes = {}
     for name, (value, shape) in hidden.items():
-        effect, label = bench.effects[name], name
+        effect, label = problem.effects[name], name
         if shape is not None:
             label = f"{name}{MARK}{shape:g} as hidden"
-            bench.effects[label] = effect.with_shape(shape)
+            problem.effects[label] = effect.with_shape(shape)
         amplitudes[label] = value - effect.amplitudes[0].null
     start = (math.log(truth["pm"]), amplitudes)
-    fit = fit_hypothesis(bench, tuple(amplitudes), start, nuisances=found.best, iterations=0)
-    true = measure_gain(found.held_out_nominal, predict_held_out(bench, fit, known=True))
+    fit = fit_hypothesis(problem, tuple(amplitudes), start, nuisances=found.best, iterations=0)
+    true = measure_gain(found.held_out_nominal, predict_held_out(problem, fit, known=True))
     before = found.gain.rms_nominal**2
     removed, removable = before - found.gain.rms_extended**2, before - true.rms_extended**2
     share = removed / removable if removable > LEAST_REMOVED * before else math.nan

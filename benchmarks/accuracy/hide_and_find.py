@@ -95,14 +95,14 @@ class Plan:
 def list_candidates(campaign: Campaign, store: RunStore, truth: TruthTable, workers: int) -> Catalogue:
     """What can be hidden, from the fingerprints of a campaign with nothing hidden and no noise."""
     plain = measure_hidden(truth, Hidden(), np.random.default_rng(0), laboratory=QUIET)
-    bench, fit = prepare(campaign, store, workers=workers, measurements=plain)
-    screening = screen(bench, fit, np.random.default_rng(0))
+    problem, fit = prepare(campaign, store, workers=workers, measurements=plain)
+    screening = screen(problem, fit, np.random.default_rng(0))
     kept = [k for k, name in enumerate(screening.names) if name not in NOT_HIDDEN]
     names = [screening.names[k] for k in kept]
     return Catalogue(
         names,
-        {name: bench.effects[name].kind for name in names},
-        {name for name in names if bench.costs_runs(name)},
+        {name: problem.effects[name].kind for name in names},
+        {name for name in names if problem.affects_simulation(name)},
         screening.cosines[np.ix_(kept, kept)],
     )
 

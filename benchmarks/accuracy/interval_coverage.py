@@ -20,7 +20,7 @@ from benchmarks.accuracy.own_campaigns import append_rows, interval, open_campai
 from benchmarks.truths.measured import LABORATORY, measure_hidden
 from benchmarks.truths.table import Hidden, TruthTable
 from labsim.inference.calibrate import prepare, sample_fit
-from labsim.inference.fits.fitting import goodness_of_fit
+from labsim.inference.fits.fitting import fit_p_value
 from labsim.inference.scatter import allow_scatter
 from labsim.records import Campaign
 from labsim.runs.store import RunStore
@@ -36,9 +36,9 @@ def calibrate_hidden(job: tuple[Campaign, Path | None, TruthTable, int, float]) 
     laboratory = replace(LABORATORY, samples=samples)
     measurements = measure_hidden(truth, Hidden(p_m=p_m), rng, laboratory=laboratory)
     began = time.perf_counter()
-    bench, fit = prepare(campaign, RunStore(store), workers=1, measurements=measurements)
-    bench, fit, _ = allow_scatter(bench, fit)
-    chain = sample_fit(bench, fit, seed=seed).samples("p_m_Pa")
+    problem, fit = prepare(campaign, RunStore(store), workers=1, measurements=measurements)
+    problem, fit, _ = allow_scatter(problem, fit)
+    chain = sample_fit(problem, fit, seed=seed).samples("p_m_Pa")
     low, middle, high = np.quantile(chain, [0.05, 0.5, 0.95])
     return {
         "seed": seed,
@@ -47,8 +47,8 @@ def calibrate_hidden(job: tuple[Campaign, Path | None, TruthTable, int, float]) 
         "middle": middle,
         "high": high,
         "rank": float(np.mean(chain < p_m)),
-        "scatter": bench.terms.scatter,
-        "goodness": goodness_of_fit(fit),
+        "scatter": problem.budget.scatter,
+        "goodness": fit_p_value(fit),
         "wall": time.perf_counter() - began,
     }
 

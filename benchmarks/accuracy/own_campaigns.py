@@ -38,7 +38,7 @@ from labsim.diagnosis.campaign import judge_scatters
 from labsim.diagnosis.screen import CONFUSABLE
 from labsim.effects import list_effects
 from labsim.inference.calibrate import prepare
-from labsim.inference.fits.fitting import goodness_of_fit
+from labsim.inference.fits.fitting import fit_p_value
 from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 from labsim.runs.store import RunStore
 
@@ -81,7 +81,7 @@ def judge_hidden(
     measurements = measure_hidden(truth, hidden, np.random.default_rng(seed), laboratory=laboratory)
     store = RunStore(store_at)
     found = judge_scatters(
-        campaign, lambda terms: prepare(campaign, store, terms=terms, workers=1, measurements=measurements)
+        campaign, lambda budget: prepare(campaign, store, budget=budget, workers=1, measurements=measurements)
     )
     names = found.screening.names
     alike = {
@@ -101,7 +101,7 @@ def judge_hidden(
         "cause": hidden.cause,
         "values": {name: dict(values) for name, values in hidden.effects.items()},
         "samples": samples,
-        "scatter": found.bench.terms.scatter,
+        "scatter": found.problem.budget.scatter,
         "strength": strength,
         "counted": counted,
         "seed": seed,
@@ -112,14 +112,14 @@ def judge_hidden(
         "p_m_averaged_90": np.quantile(averaged, [0.05, 0.95]).tolist(),
         "value": value,
         "found": {
-            name: found.bench.effects[name].amplitudes[0].null + amplitude
+            name: found.problem.effects[name].amplitudes[0].null + amplitude
             for name, amplitude in found.best.values.items()
         },
         "first": name_hypothesis(first[0]),
         "probability": first[1],
         "ranked": [(name_hypothesis(h), p) for h, p in found.verdict.probabilities],
         "alike": alike,
-        "goodness": goodness_of_fit(found.nominal),
+        "goodness": fit_p_value(found.nominal),
         "p_value": found.p_value,
         "wall": time.perf_counter() - began,
         "cpu": time.process_time() - busy,

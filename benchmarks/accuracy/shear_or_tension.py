@@ -18,7 +18,7 @@ from benchmarks.campaigns.labelled import measure_campaigns
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.fitting import fit_hypothesis
-from labsim.inference.scatter import set_terms
+from labsim.inference.scatter import set_error_budget
 from labsim.runs.store import RunStore
 
 CAUSES = ("shear_strength", "tensile_strength")
@@ -30,10 +30,10 @@ def weigh(folder: Path, tested: bool) -> dict[str, float]:
     campaign = read_campaign(folder)
     if not tested:
         campaign = replace(campaign, strength_tests=())
-    bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+    problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
     return {
         cause: max(
-            fit_hypothesis(bench, (cause,), (nominal.log_p_m, {cause: start})).evidence for start in STARTS
+            fit_hypothesis(problem, (cause,), (nominal.log_p_m, {cause: start})).evidence for start in STARTS
         )
         - nominal.evidence
         for cause in CAUSES

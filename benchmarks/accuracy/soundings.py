@@ -39,7 +39,7 @@ def judge_pushes(
     chosen = replace(campaign, drops=tuple(push.drop for push in pushes))
     seen = Measurements(list(pushes))
     return judge_scatters(
-        chosen, lambda terms: prepare(chosen, store, terms=terms, workers=workers, measurements=seen)
+        chosen, lambda budget: prepare(chosen, store, budget=budget, workers=workers, measurements=seen)
     )
 
 

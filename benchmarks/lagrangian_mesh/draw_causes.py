@@ -81,11 +81,11 @@ def hide(name: str, effect: Effect, size: float, rng: np.random.Generator) -> tu
 
 def find_sizes(campaign: Campaign) -> dict[str, tuple[Effect, float]]:
     """Of every cause: the effect and the amplitude that is SIGMAS standard deviations where it is small."""
-    bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
-    found = screen(bench, nominal, np.random.default_rng(1))
+    problem, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+    found = screen(problem, nominal, np.random.default_rng(1))
     signal = {score.name: score.signal for score in found.scores}
     return {
-        name: (bench.effects[name], SIGMAS / signal[name])
+        name: (problem.effects[name], SIGMAS / signal[name])
         for name in CAUSES
         if signal.get(name, 0.0) > 0.0 and math.isfinite(signal[name])
     }
@@ -99,9 +99,9 @@ def find_strength(plan: dict, name: str, amplitude: float, folder: Path) -> floa
         campaign = read_campaign(Path(made) / label)
         low, high = campaign.p_m_range
         campaign = replace(campaign, p_m_range=(low / ROOM, high * ROOM))
-        bench, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+        problem, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
         # from the truth: from the nominal p_m, far off where the cause is strong, some fits ended halfway
-        found = fit_hypothesis(bench, (name,), (math.log(plan["pm"]), {name: amplitude}))
+        found = fit_hypothesis(problem, (name,), (math.log(plan["pm"]), {name: amplitude}))
         return math.sqrt(max(nominal.chi_square - found.chi_square, 0.0))
 
 

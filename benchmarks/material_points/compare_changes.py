@@ -24,7 +24,7 @@ from labsim.campaign import read_campaign
 from labsim.effects import Effect, list_effects
 from labsim.inference.emulation.grid import DEFAULT_CELLS, set_nominal_drop
 from labsim.inference.fits.blocks import Block
-from labsim.inference.observations.drop_terms import USUAL_DEPTH, NumericalError, Terms
+from labsim.inference.observations.linearised_drop import USUAL_DEPTH, ErrorBudget, NumericalError
 from labsim.inference.observations.tracks import numerical_covariance
 from labsim.sph import DropSetting, simulate
 
@@ -94,7 +94,9 @@ def run_campaign(folder: Path, truth: dict, hidden: dict[str, float], cells: flo
                 "size": math.log(drop.projectile.tip_radius / 0.5e-3),
                 "mass": math.log(drop.projectile.mass / drop.projectile.tip_radius**3 / 1.064e4),
                 # of samples whose own p_m is not told
-                "sigma": LEFT if "p_m" in true else math.hypot(LEFT, DEPTH_BY_STRENGTH * Terms().scatter),
+                "sigma": LEFT
+                if "p_m" in true
+                else math.hypot(LEFT, DEPTH_BY_STRENGTH * ErrorBudget().scatter),
             }
         )
     return rows
@@ -108,12 +110,12 @@ def fit_nominal(rows: pd.DataFrame, by: str = "reach") -> np.ndarray:
     return np.asarray(design @ best)
 
 
-def log_likelihood(rows: pd.DataFrame, terms: Terms, by: str) -> float:
+def log_likelihood(rows: pd.DataFrame, budget: ErrorBudget, by: str) -> float:
     """Of the differences of the depths, of all campaigns together; by : what drops are alike by, reach or froude."""
     total = 0.0
     for _, drops in rows.sort_values("reach", kind="stable").groupby("campaign"):
         changed = 1.0 - np.exp(-drops.change.to_numpy())
-        size = np.hypot(terms.numerical, terms.numerical_change * changed)
+        size = np.hypot(budget.numerical, budget.numerical_change * changed)
         parts = [
             NumericalError(np.array([s]), np.ones(1), x, r, m)
             for s, x, r, m in zip(size, drops[by], drops["size"], drops.mass, strict=True)
@@ -121,9 +123,9 @@ def log_likelihood(rows: pd.DataFrame, terms: Terms, by: str) -> float:
         usual = np.interp(USUAL_DEPTH, drops.reach, drops[by])
         shared = np.column_stack(
             [
-                (drops[by] - usual) * terms.numerical_slope,
-                np.exp(-drops.reach) * terms.contact_offset,
-                np.full(len(drops), DEPTH_BY_STRENGTH * terms.numerical_strength),
+                (drops[by] - usual) * budget.numerical_slope,
+                np.exp(-drops.reach) * budget.contact_offset,
+                np.full(len(drops), DEPTH_BY_STRENGTH * budget.numerical_strength),
             ]
         )
         covariance = numerical_covariance(parts) + shared @ shared.T + np.diag(drops.sigma**2)
@@ -155,9 +157,9 @@ def tabulate(rows: pd.DataFrame) -> pd.DataFrame:
 def compare_sizes(rows: pd.DataFrame) -> str:
     """ln likelihood less that of the sizes as they are."""
     without_gas = rows[~rows.hidden.str.contains("pore_gas")]
-    found = {"alike by speed over root of radius": log_likelihood(without_gas, Terms(), "froude")}
+    found = {"alike by speed over root of radius": log_likelihood(without_gas, ErrorBudget(), "froude")}
     for name, sizes in TRIED.items():
-        found[name] = log_likelihood(without_gas, replace(Terms(), **sizes), "reach")
+        found[name] = log_likelihood(without_gas, replace(ErrorBudget(), **sizes), "reach")
     return "\n".join(f"{name:36s}{each - found['as they are']:+9.1f}" for name, each in found.items())
 
 

@@ -21,7 +21,7 @@ from labsim.inference.fits.blocks import Block
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations import compacted_zone
-from labsim.inference.workbench import Workbench
+from labsim.inference.problem import Problem
 from labsim.runs.store import RunStore
 
 FLOORS = (0.003, 0.001, 0.0005, 0.0003)  # beside the one that is
@@ -32,12 +32,12 @@ def rate(block: Block) -> float:
     return -0.5 * (block.chi_square + block.log_determinant)
 
 
-def rate_with(bench: Workbench, fit: Fit, floor: float) -> float:
+def rate_with(problem: Problem, fit: Fit, floor: float) -> float:
     """ln likelihood of the maps with another error where nothing is compacted."""
     usual = compacted_zone.NUMERICAL_FLOOR
     compacted_zone.NUMERICAL_FLOOR = floor
     try:
-        return rate(linearise_at(bench, fit.nuisances, fit.log_p_m, fit.values)[1])
+        return rate(linearise_at(problem, fit.nuisances, fit.log_p_m, fit.values)[1])
     finally:
         compacted_zone.NUMERICAL_FLOOR = usual
 
@@ -56,17 +56,17 @@ def main() -> None:
         hidden = read_hidden(truth)
         if hidden is None or not (given.folder / name).is_dir():
             continue
-        bench, nominal = prepare(read_campaign(given.folder / name), RunStore(given.store), workers=1)
-        if len(bench.scans) < 2:
+        problem, nominal = prepare(read_campaign(given.folder / name), RunStore(given.store), workers=1)
+        if len(problem.scans) < 2:
             continue
         values = {
-            effect: value - bench.effects[effect].amplitudes[0].null for effect, value in hidden.items()
+            effect: value - problem.effects[effect].amplitudes[0].null for effect, value in hidden.items()
         }
         start = (math.log(truth["pm"]), values)
-        fit = fit_hypothesis(bench, tuple(hidden), start, iterations=0, nuisances=nominal)
+        fit = fit_hypothesis(problem, tuple(hidden), start, iterations=0, nuisances=nominal)
         maps = fit.blocks[1]
         each = [Block(maps.residual[s], maps.covariance[s, s], {}) for s in maps.sections.values()]
-        other = " | ".join(f"{rate_with(bench, fit, floor) - rate(maps):+.1f}" for floor in FLOORS)
+        other = " | ".join(f"{rate_with(problem, fit, floor) - rate(maps):+.1f}" for floor in FLOORS)
         print(
             f"| {name} | {len(each)} | {maps.residual.size} | {maps.chi_square:.0f} | "
             f"{rate(maps) - sum(map(rate, each)):+.1f} | {other} |",

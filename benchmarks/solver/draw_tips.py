@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from labsim.records import Material, Motion, Projectile
-from labsim.report.figures.look import new_figure
+from labsim.report.figures.style import new_figure
 from labsim.sph import DropSetting, simulate
 from labsim.sph.profile import outline
 from labsim.sph.setting import base_area

@@ -123,12 +123,12 @@ class StrengthCount:
             for _ in range(STEPS):
                 amplitude = _aim(strengths, sigma)
                 hidden = hide(effect, amplitude)
-                if not effect.costs_runs:
+                if not effect.affects_simulation:
                     self.truth.prepare([hidden])  # another blur of the maps
                 strengths[amplitude] = self.measure(hidden)
                 if abs(strengths[amplitude] / sigma - 1) < SETTLED:
                     break
-            if effect.costs_runs:
+            if effect.affects_simulation:
                 strengths[amplitude] = self.simulate(effect, amplitude)
             if abs(strengths[amplitude] / sigma - 1) < ACCEPTED:
                 break

@@ -214,7 +214,7 @@ class TruthTable:
         return {
             name: values
             for name, values in hidden.effects.items()
-            if name != DRIFT and self.effect(name).costs_runs
+            if name != DRIFT and self.effect(name).affects_simulation
         }
 
     def effect(self, name: str) -> Effect:

@@ -271,6 +271,6 @@ def _extend(
     lines = [
         f"{name} acts on what is measured, not on the drop; this run is the true motion without it"
         for name, _ in model.effects
-        if not known[name].costs_runs
+        if not known[name].affects_simulation
     ]
     return apply_law(apply_effects(setting, model.effects, place, known), model.law), lines

@@ -187,7 +187,7 @@ def _summary(effect: Effect, reason: str) -> dict[str, Any]:
         "leaves": effect.leaves,
         "expect": dict(effect.expect),
         "references": list(effect.references),
-        "costs_runs": effect.costs_runs,
+        "affects_simulation": effect.affects_simulation,
         "applies": not reason,
         "reason_against": reason,
         "file": effect.file,

@@ -28,7 +28,7 @@ def strength(
 ) -> None:
     """Fit the curves of static compression, tension and shear tests, and compare them with the drops' p_m."""
     from ..inference.fits.fitting import REJECTED
-    from ..inference.observations.drop_terms import Terms
+    from ..inference.observations.linearised_drop import ErrorBudget
     from ..inference.observations.static_tests import PARAMETERS, fit_softness, fit_strength
     from ..report.figures.strengths import draw_strength
 
@@ -38,7 +38,7 @@ def strength(
             read.folder / "strength", "", "holds no test; add strength/S01/strength.toml (docs: static tests)"
         )
     dynamic = None if calibration is None else _read_dynamic(calibration)
-    scatter = Terms().scatter if read.sample.scatter is None else read.sample.scatter
+    scatter = ErrorBudget().scatter if read.sample.scatter is None else read.sample.scatter
     by_kind = {kind: [t for t in read.strength_tests if t.kind == kind] for kind in STRENGTH_KINDS}
     fits = [fit_strength(kind, tests, scatter) for kind, tests in by_kind.items() if tests]
     folder = options.make_output_folder(out, campaign, "strength")

@@ -19,34 +19,34 @@ from ..inference.calibrate import (
     warn_unsettled,
     warn_unused_scans,
 )
-from ..inference.fits.fitting import REJECTED, Fit, fit_hypothesis, goodness_of_fit
+from ..inference.fits.fitting import REJECTED, Fit, fit_hypothesis, fit_p_value
 from ..inference.fits.posterior import Posterior
-from ..inference.fits.settle import list_large, settle
+from ..inference.fits.refine import list_large_effects, refine
 from ..inference.free_fall import doubt_scales
 from ..inference.measure import Measurements, measure
-from ..inference.observations.drop_terms import Terms
+from ..inference.observations.linearised_drop import ErrorBudget
+from ..inference.problem import Problem
 from ..inference.scatter import (
     Scatter,
     ScatterEstimate,
     estimate_scatter,
     find_larger,
     fit_with,
-    set_terms,
+    set_error_budget,
     weigh_least,
 )
 from ..inference.surface_rows import doubt_surface_rows
-from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from ..runs.store import Progress, RunStore
 from .average import average_p_m
-from .explore import EXPLORED, explore, is_open
+from .explore import EXPLORED, explore, needs_exploration
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
-from .pairs import confirm_pairs, return_to_singles, settle_leading
+from .pairs import confirm_pairs, refine_leading, return_to_singles
 from .screen import CLOSE, Score, Screening, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
-from .unlisted.free_law import fit_hats, is_wanted
+from .unlisted.free_law import fit_hats, needs_free_law
 from .unlisted.learned_law import LearnedLaw, learn_law
 from .unlisted.unknown import UnknownFit, fit_unknown
 from .untestable import Combination, Untestable, find_combination, list_untestable
@@ -58,7 +58,7 @@ ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
 MOST_EXPLORED = 3
 MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for the others
 NARROW = 15.0  # the same between effects whose order more runs may change
-MOST_SETTLED = 2  # large effects with runs at three strengths and amplitudes about them
+MOST_REFINED = 2  # large effects with runs at three strengths and amplitudes about them
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Judgement:
     """
 
     campaign: Campaign
-    bench: Workbench
+    problem: Problem
     nominal: Fit
     rivals: list[Fit]
     screening: Screening
@@ -85,7 +85,7 @@ class Judgement:
         """The cause named first and those from which these data cannot tell it; none where there are no others."""
         if self.verdict.word != "effect" or len(self.best.hypothesis) != 1:
             return []
-        found = find_class(self.best, self.rivals, _list_rough(self.bench))
+        found = find_class(self.best, self.rivals, _list_rough(self.problem))
         return found if len(found) > 1 else []
 
     @property
@@ -126,42 +126,42 @@ class Diagnosis(Judgement):
         return f"<Diagnosis of {self.campaign.name}: {said}>"
 
 
-def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequence[Fit] = ()) -> Judgement:
+def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequence[Fit] = ()) -> Judgement:
     """Screen, confirm, judge what ``prepare`` gives of a campaign. Raises LabsimError subclasses as its parts do.
 
     known : fits to the same data with other error terms, from which fits begin as well.
     """
-    lay_out_shapes(bench)
-    screening = screen(bench, nominal, np.random.default_rng(seed))
-    p_value = min(1.0, 2.0 * min(screening.p_value, goodness_of_fit(nominal)))
-    unknown = fit_unknown(bench, nominal)
-    fits = confirm_singles(bench, nominal, screening)
+    lay_out_shapes(problem)
+    screening = screen(problem, nominal, np.random.default_rng(seed))
+    p_value = min(1.0, 2.0 * min(screening.p_value, fit_p_value(nominal)))
+    unknown = fit_unknown(problem, nominal)
+    fits = confirm_singles(problem, nominal, screening)
     explored: dict[str, Fit] = {}
-    if is_open(bench, nominal, fits, screening, unknown.evidence):
-        explored = explore(bench, nominal, screening, fits)
-        fits = confirm_explored(bench, nominal, fits, explored, unknown.evidence)
-    fits = confirm_known(bench, fits, known)
-    fits = settle_best(bench, fits, unknown.evidence)
-    rivals, screening = merge_variants(bench, nominal, fits, screening, explored)
-    pairs = confirm_pairs(bench, nominal, rivals, screening, unknown.evidence)
-    pairs = settle_leading(bench, rivals, pairs, unknown.evidence)
-    rivals = return_to_singles(bench, rivals, pairs) + pairs
+    if needs_exploration(problem, nominal, fits, screening, unknown.evidence):
+        explored = explore(problem, nominal, screening, fits)
+        fits = confirm_explored(problem, nominal, fits, explored, unknown.evidence)
+    fits = confirm_known(problem, fits, known)
+    fits = refine_best(problem, fits, unknown.evidence)
+    rivals, screening = merge_variants(problem, nominal, fits, screening, explored)
+    pairs = confirm_pairs(problem, nominal, rivals, screening, unknown.evidence)
+    pairs = refine_leading(problem, rivals, pairs, unknown.evidence)
+    rivals = return_to_singles(problem, rivals, pairs) + pairs
     leading = find_leading(rivals, nominal)
     predicted = 1.0
     if p_value < REJECTED and rivals:
-        predicted = check_leading(bench, leading, np.random.default_rng(seed))
-    if not any(family.pushed for family in bench.families) and is_wanted(
+        predicted = check_leading(problem, leading, np.random.default_rng(seed))
+    if not any(group.pushed for group in problem.groups) and needs_free_law(
         p_value, rivals, unknown.evidence, predicted
     ):  # the laws without a name are those of drops
-        unknown = fit_unknown(bench, nominal, fit_hats(bench, nominal))
+        unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal))
     verdict = judge(
         nominal,
         rivals,
         unknown.evidence,
-        list(bench.effects),
+        list(problem.effects),
         {score.name: score.log_bayes for score in screening.scores},
         predicted,
-        _list_rough(bench),
+        _list_rough(problem),
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it
@@ -169,61 +169,61 @@ def judge_campaign(bench: Workbench, nominal: Fit, *, seed: int = 1, known: Sequ
     else:
         best = next((fit for fit in rivals if fit.hypothesis == first), nominal)
     return Judgement(
-        bench.campaign, bench, nominal, rivals, screening, unknown, verdict, p_value, predicted, best
+        problem.campaign, problem, nominal, rivals, screening, unknown, verdict, p_value, predicted, best
     )
 
 
-def _list_rough(bench: Workbench) -> list[str]:
+def _list_rough(problem: Problem) -> list[str]:
     """Causes that change runs, where accelerometers feel what they change."""
-    return [name for name in bench.effects if bench.felt and bench.costs_runs(name)]
+    return [name for name in problem.effects if problem.felt and problem.affects_simulation(name)]
 
 
 def judge_scatters(
-    campaign: Campaign, open_with: Callable[[Terms], tuple[Workbench, Fit]], *, seed: int = 1
+    campaign: Campaign, open_with: Callable[[ErrorBudget], tuple[Problem, Fit]], *, seed: int = 1
 ) -> Judgement:
     """Judge with the least scatter of samples, or with the larger one that the nominal model or the leading cause asks for.
 
-    open_with : a workbench and its nominal fit for given error terms. A larger scatter is taken where the model that asks for it
+    open_with : a problem and its nominal fit for given error budget. A larger scatter is taken where the model that asks for it
     stands, with its prior and its evidence, before all that was found with the least one. The nominal model is asked first: where
     it stands before all that may be found at all, nothing is looked for with the least one.
     """
-    terms = set_terms(campaign)
-    bench, nominal = open_with(terms)
-    least = weigh_least(terms.scatter)
-    asked = find_larger(least, bench, nominal)
+    budget = set_error_budget(campaign)
+    problem, nominal = open_with(budget)
+    least = weigh_least(budget.scatter)
+    asked = find_larger(least, problem, nominal)
     if asked is not None:
-        _, loose = fit_with(asked, bench, nominal)
-        if asked.log_prior + loose.evidence > least.log_prior + _promise(bench, nominal, seed):
-            return judge_campaign(*open_with(replace(terms, scatter=asked.value)), seed=seed)
-    found = judge_campaign(bench, nominal, seed=seed)
+        _, loose = fit_with(asked, problem, nominal)
+        if asked.log_prior + loose.evidence > least.log_prior + _promise(problem, nominal, seed):
+            return judge_campaign(*open_with(replace(budget, scatter=asked.value)), seed=seed)
+    found = judge_campaign(problem, nominal, seed=seed)
     larger = _find_larger(found, least)
     if larger is None:
         return found
-    return judge_campaign(*open_with(replace(terms, scatter=larger)), seed=seed, known=found.rivals)
+    return judge_campaign(*open_with(replace(budget, scatter=larger)), seed=seed, known=found.rivals)
 
 
 def _find_larger(found: Judgement, least: Scatter) -> float | None:
     """The scatter with which the nominal model or the leading cause stands before all that was found with the least one."""
 
     def stand(fit: Fit) -> float:
-        return weigh_prior(fit.hypothesis, list(found.bench.effects)) + fit.evidence
+        return weigh_prior(fit.hypothesis, list(found.problem.effects)) + fit.evidence
 
     unknown = math.log(PRIOR_UNKNOWN) + found.unknown.evidence
     best, value = least.log_prior + max(unknown, *map(stand, [found.nominal, *found.rivals])), None
     for fit in [found.nominal, found.leading][: 1 + bool(found.rivals)]:
-        asked = find_larger(least, found.bench, fit)
+        asked = find_larger(least, found.problem, fit)
         if asked is not None:
-            reached = asked.log_prior + stand(fit_with(asked, found.bench, fit)[1])
+            reached = asked.log_prior + stand(fit_with(asked, found.problem, fit)[1])
             if reached > best:
                 best, value = reached, asked.value
     return value
 
 
-def _promise(bench: Workbench, nominal: Fit, seed: int) -> float:
+def _promise(problem: Problem, nominal: Fit, seed: int) -> float:
     """ln evidence that the best hypothesis may reach, by what costs next to nothing: tangents, and a law without a name."""
-    best = screen(bench, nominal, np.random.default_rng(seed)).scores[:1]
+    best = screen(problem, nominal, np.random.default_rng(seed)).scores[:1]
     gains = [0.0, *(score.log_bayes / HALF for score in best)]
-    return max(nominal.evidence + max(gains), fit_unknown(bench, nominal).evidence)
+    return max(nominal.evidence + max(gains), fit_unknown(problem, nominal).evidence)
 
 
 def diagnose_campaign(
@@ -243,11 +243,11 @@ def diagnose_campaign(
     began = time.perf_counter()
     seen = measurements or measure(campaign)
 
-    def open_with(terms: Terms) -> tuple[Workbench, Fit]:
+    def open_with(budget: ErrorBudget) -> tuple[Problem, Fit]:
         return prepare(
             campaign,
             store,
-            terms=terms,
+            budget=budget,
             workers=workers,
             scheduler=scheduler,
             progress=progress,
@@ -257,15 +257,15 @@ def diagnose_campaign(
         )
 
     found = judge_scatters(campaign, open_with, seed=seed)
-    bench, nominal = found.bench, found.nominal
-    best = allow_for_codes(bench, nominal, found.best)
-    held_nominal, posterior = _predict(bench, nominal, seed, progress)
+    problem, nominal = found.problem, found.nominal
+    best = allow_for_codes(problem, nominal, found.best)
+    held_nominal, posterior = _predict(problem, nominal, seed, progress)
     held_best, extended = (
-        (held_nominal, posterior) if found.best is nominal else _predict(bench, best, seed, progress)
+        (held_nominal, posterior) if found.best is nominal else _predict(problem, best, seed, progress)
     )
-    warnings = [f"{name}: {reason}" for name, reason in bench.reasons.items() if "runs" in reason]
-    warnings += warn_failed(bench)
-    warnings += warn_unused_scans(bench)
+    warnings = [f"{name}: {reason}" for name, reason in problem.reasons.items() if "runs" in reason]
+    warnings += warn_failed(problem)
+    warnings += warn_unused_scans(problem)
     if found.p_value < REJECTED:
         warnings += doubt_surface_rows(seen.drops)
     if found.predicted < PREDICTED:
@@ -280,28 +280,28 @@ def diagnose_campaign(
             f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"
         )
     sampled = {fit.hypothesis: chain.calibrated for fit, chain in ((nominal, posterior), (best, extended))}
-    rivals = [allow_for_codes(bench, nominal, fit) for fit in found.rivals]
+    rivals = [allow_for_codes(problem, nominal, fit) for fit in found.rivals]
     averaged = average_p_m(found.verdict, nominal, rivals, campaign.p_m_range, sampled=sampled, seed=seed)
     about = best if found.verdict.word == "effect" else nominal
-    untestable = list_untestable(bench, about)
+    untestable = list_untestable(problem, about)
     learned, tangents = None, found.unknown.tangents
     if found.verdict.word == "unknown" and tangents is not None:
-        learned = learn_law(bench, nominal, tangents, held_nominal)
-    doubts = [f"nominal model: {text}" for text in warn_of_range(bench, nominal)]
+        learned = learn_law(problem, nominal, tangents, held_nominal)
+    doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]
     if best is not nominal:
         doubts += [
             f"with {' + '.join(best.hypothesis)}: {text}"
-            for text in warn_of_range(bench, best) + warn_unsettled(best)
+            for text in warn_of_range(problem, best) + warn_unsettled(best)
         ]
     doubts += doubt_scales(seen.drops)
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},
         confusable=list_confusable(found.screening),
         untestable=untestable,
-        combination=find_combination(bench, about, untestable),
-        misfit=measure_misfit(bench, nominal),
+        combination=find_combination(problem, about, untestable),
+        misfit=measure_misfit(problem, nominal),
         learned=learned,
         held_out_nominal=held_nominal,
         held_out_extended=held_best,
@@ -309,7 +309,7 @@ def diagnose_campaign(
         posterior_nominal=posterior,
         posterior_extended=extended,
         p_m_averaged=averaged,
-        scatter=estimate_scatter(bench, best),
+        scatter=estimate_scatter(problem, best),
         runs_new=store.new,
         runs_reused=store.reused,
         wall=time.perf_counter() - began,
@@ -318,24 +318,24 @@ def diagnose_campaign(
     )
 
 
-def allow_for_codes(bench: Workbench, nominal: Fit, fit: Fit) -> Fit:
+def allow_for_codes(problem: Problem, nominal: Fit, fit: Fit) -> Fit:
     """Let p_m beside a cause of the material be what another code would say: codes differ in what such a cause does by a share of
     that, and p_m makes up for it (docs/error-budget.md)."""
-    if not any(bench.effects[name].kind == "material" for name in fit.hypothesis):
+    if not any(problem.effects[name].kind == "material" for name in fit.hypothesis):
         return fit
-    beside = bench.terms.change_of_strength * abs(fit.log_p_m - nominal.log_p_m)
-    return replace(fit, between_codes=math.hypot(bench.terms.other_codes, beside))
+    beside = problem.budget.change_of_strength * abs(fit.log_p_m - nominal.log_p_m)
+    return replace(fit, between_codes=math.hypot(problem.budget.other_codes, beside))
 
 
-def check_leading(bench: Workbench, leading: Fit, rng: np.random.Generator) -> float:
+def check_leading(problem: Problem, leading: Fit, rng: np.random.Generator) -> float:
     """p value of held-out drops with the leading cause, or of the data that it was fitted to where it fails there."""
-    predicted = check_prediction(bench, leading, rng)
-    return min(predicted, goodness_of_fit(leading)) if fails(leading) else predicted
+    predicted = check_prediction(problem, leading, rng)
+    return min(predicted, fit_p_value(leading)) if fails(leading) else predicted
 
 
 def fails(fit: Fit) -> bool:
     """Whether a hypothesis does not explain the data that it was fitted to."""
-    return goodness_of_fit(fit) < REJECTED
+    return fit_p_value(fit) < REJECTED
 
 
 def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:
@@ -343,66 +343,70 @@ def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:
     return max(rivals, key=lambda fit: fit.evidence, default=nominal)
 
 
-def _predict(bench: Workbench, fit: Fit, seed: int, progress: Progress | None) -> tuple[HeldOut, Posterior]:
+def _predict(problem: Problem, fit: Fit, seed: int, progress: Progress | None) -> tuple[HeldOut, Posterior]:
     """What follows from a fit: of held-out drops, of its parameters."""
-    return predict_held_out(bench, fit), sample_fit(bench, fit, seed=seed, progress=progress)
+    return predict_held_out(problem, fit), sample_fit(problem, fit, seed=seed, progress=progress)
 
 
-def warn_failed(bench: Workbench) -> list[str]:
+def warn_failed(problem: Problem) -> list[str]:
     """Of every cause that no verdict knows of: of one projectile at least, no run with it stopped, on either side of its null."""
     return [
         f"{name}: is not judged, since its runs fail; see labsim runs"
-        for name, effect in bench.effects.items()
-        if effect.amplitudes and bench.costs_runs(name) and cause(name) == name and not has_runs(bench, name)
+        for name, effect in problem.effects.items()
+        if effect.amplitudes
+        and problem.affects_simulation(name)
+        and cause(name) == name
+        and not has_runs(problem, name)
     ]
 
 
-def confirm_singles(bench: Workbench, nominal: Fit, screening: Screening) -> list[Fit]:
+def confirm_singles(problem: Problem, nominal: Fit, screening: Screening) -> list[Fit]:
     """Re-simulate the effects that the screening cannot exclude; those of the measurement cost nothing and are all fitted."""
     if not screening.scores:
         return []
-    free = [score for score in screening.scores if not bench.costs_runs(score.name)]
-    fits = [_fit_from_score(bench, nominal, score) for score in free]
+    free = [score for score in screening.scores if not problem.affects_simulation(score.name)]
+    fits = [_fit_from_score(problem, nominal, score) for score in free]
     top = max([screening.scores[0].log_bayes, *(fit.evidence - nominal.evidence for fit in fits)])
 
     def least(score: Score) -> float:
-        explored = bench.effects[score.name].kind in EXPLORED
+        explored = problem.effects[score.name].kind in EXPLORED
         return top - CLOSE if explored else min(top - CLOSE, HALF * top)
 
     costly = [
         score
         for score in screening.scores
-        if bench.costs_runs(score.name)
+        if problem.affects_simulation(score.name)
         and score.log_bayes > max(least(score), WORTHWHILE)
         # finer runs for a suspicion of coarseness only where nothing else explains as much
-        and (bench.effects[score.name].kind != "numerics" or score is screening.scores[0])
+        and (problem.effects[score.name].kind != "numerics" or score is screening.scores[0])
     ][:MOST_RERUN]
     for score in costly:
         variants = sum(cause(fit.hypothesis[0]) == cause(score.name) for fit in fits)
         if score.log_bayes < least(score) or variants >= MOST_VARIANTS:  # far behind by now
             continue
         with suppress(ExtrapolationError):  # its runs lead nowhere: no candidate
-            fits.append(_fit_from_score(bench, nominal, score))
+            fits.append(_fit_from_score(problem, nominal, score))
             top = max(top, fits[-1].evidence - nominal.evidence)
     return fits
 
 
 def confirm_explored(
-    bench: Workbench, nominal: Fit, fits: list[Fit], explored: dict[str, Fit], without_place: float
+    problem: Problem, nominal: Fit, fits: list[Fit], explored: dict[str, Fit], log_evidence_unknown: float
 ) -> list[Fit]:
     """The fits with those joined, or replaced, that start from the best of exploring.
 
-    One that gains less than HALF of what a law without a name (``without_place``, its ln evidence) does is not worth finer runs.
+    One that gains less than HALF of what a law without a name (``log_evidence_unknown``, its ln evidence) does is not worth
+    more runs.
     """
     known = {fit.hypothesis[0]: fit for fit in fits}
     top = max([nominal.evidence, *(fit.evidence for fit in [*fits, *explored.values()])])
-    worth = nominal.evidence + HALF * (without_place - nominal.evidence)
+    worth = nominal.evidence + HALF * (log_evidence_unknown - nominal.evidence)
     ranked = sorted(explored, key=lambda name: -explored[name].evidence)
     for name in [name for name in ranked if explored[name].evidence > top - ROUGH][:MOST_EXPLORED]:
         fit = start = explored[name]
         if start.evidence > worth:
             try:
-                fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values), nuisances=start)
+                fit = fit_hypothesis(problem, (name,), (start.log_p_m, start.values), nuisances=start)
             except ExtrapolationError:
                 continue
         if name not in known or fit.evidence > known[name].evidence:
@@ -410,51 +414,53 @@ def confirm_explored(
     return list(known.values())
 
 
-def confirm_known(bench: Workbench, fits: list[Fit], known: Sequence[Fit]) -> list[Fit]:
+def confirm_known(problem: Problem, fits: list[Fit], known: Sequence[Fit]) -> list[Fit]:
     """The fits with those joined, or replaced, that start from the best of ``known``."""
     best = {fit.hypothesis[0]: fit for fit in fits}
-    singles = [each for each in known if len(each.hypothesis) == 1 and bench.costs_runs(each.hypothesis[0])]
+    singles = [
+        each for each in known if len(each.hypothesis) == 1 and problem.affects_simulation(each.hypothesis[0])
+    ]
     top = max((each.evidence for each in singles), default=0.0)
     for start in singles:
         name = start.hypothesis[0]
         if start.evidence > top - CLOSE:
             with suppress(ExtrapolationError):
-                fit = fit_hypothesis(bench, (name,), (start.log_p_m, start.values))
+                fit = fit_hypothesis(problem, (name,), (start.log_p_m, start.values))
                 if name not in best or fit.evidence > best[name].evidence:
                     best[name] = fit
     return list(best.values())
 
 
-def settle_best(bench: Workbench, fits: list[Fit], without_place: float) -> list[Fit]:
+def refine_best(problem: Problem, fits: list[Fit], log_evidence_unknown: float) -> list[Fit]:
     """The fits with the best of those that are large made once more with runs at three strengths and amplitudes about them.
 
     One or two lead there; what tells two large effects apart is how they bend with p_m. Where a law without a name
-    (``without_place``, its ln evidence) is far ahead of all, none is worth the runs.
+    (``log_evidence_unknown``, its ln evidence) is far ahead of all, none is worth the runs.
     """
-    least = max([without_place - CLOSE, *(fit.evidence - NARROW for fit in fits)])
+    least = max([log_evidence_unknown - CLOSE, *(fit.evidence - NARROW for fit in fits)])
     settled: list[Fit] = []
     again: set[str] = set()  # one variant of a cause
     for fit in sorted(fits, key=lambda fit: -fit.evidence):
         name = fit.hypothesis[0]
         if (
-            len(again) < MOST_SETTLED
+            len(again) < MOST_REFINED
             and cause(name) not in again
             and fit.evidence > least
-            and list_large(bench, fit)
+            and list_large_effects(problem, fit)
         ):
             again.add(cause(name))
             with suppress(ExtrapolationError):
-                fit = settle(bench, fit)
+                fit = refine(problem, fit)
         settled.append(fit)
     return settled
 
 
-def _fit_from_score(bench: Workbench, nominal: Fit, score: Score) -> Fit:
-    reach = 2 * abs(bench.effects[score.name].amplitudes[0].step)
+def _fit_from_score(problem: Problem, nominal: Fit, score: Score) -> Fit:
+    reach = 2 * abs(problem.effects[score.name].amplitudes[0].step)
     start = float(np.clip(score.amplitude, -reach, reach))
-    fit = fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: start}))
+    fit = fit_hypothesis(problem, (score.name,), (nominal.log_p_m, {score.name: start}))
     if fit.log_likelihood > nominal.log_likelihood:
         return fit
     # the best is no less likely than null, which it holds: from a far start the fit has ended at a limit
-    again = fit_hypothesis(bench, (score.name,), (nominal.log_p_m, {score.name: 0.0}), nuisances=nominal)
+    again = fit_hypothesis(problem, (score.name,), (nominal.log_p_m, {score.name: 0.0}), nuisances=nominal)
     return max(fit, again, key=lambda each: each.evidence)

@@ -21,10 +21,10 @@ from ..inference.fits.fitting import (
     Fit,
     Hypothesis,
     fit_hypothesis,
-    goodness_of_fit,
-    with_probes,
+    fit_p_value,
+    with_perturbations,
 )
-from ..inference.workbench import Workbench
+from ..inference.problem import Problem
 from .screen import Screening
 from .shapes import cause
 
@@ -36,25 +36,25 @@ HOPELESS = 60.0  # ln evidence behind the best at which a start is not followed 
 FIRST_STEPS = 4
 
 
-def is_open(
-    bench: Workbench, nominal: Fit, fits: Sequence[Fit], screening: Screening, without_place: float
+def needs_exploration(
+    problem: Problem, nominal: Fit, fits: Sequence[Fit], screening: Screening, log_evidence_unknown: float
 ) -> bool:
     """Whether the nominal model fails, and either nothing explains the data or only what p_m can be traded for.
 
     However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another.
-    without_place : ln evidence of a law without a name.
+    log_evidence_unknown : ln evidence of a law without a name.
     """
-    best = max([without_place - nominal.evidence, *(each.log_bayes for each in screening.scores[:1])])
-    if best <= PROMISING and goodness_of_fit(nominal) >= DOUBTFUL:
+    best = max([log_evidence_unknown - nominal.evidence, *(each.log_bayes for each in screening.scores[:1])])
+    if best <= PROMISING and fit_p_value(nominal) >= DOUBTFUL:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    if found.evidence < nominal.evidence + PROMISING or goodness_of_fit(found) < REJECTED:
+    if found.evidence < nominal.evidence + PROMISING or fit_p_value(found) < REJECTED:
         return True
-    return bench.effects[found.hypothesis[0]].kind in EXPLORED
+    return problem.effects[found.hypothesis[0]].kind in EXPLORED
 
 
-def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence[Fit]) -> dict[str, Fit]:
-    """Best coarse fit of every effect that p_m can make up for, by name; of variants in shape the stated one.
+def explore(problem: Problem, nominal: Fit, screening: Screening, fits: Sequence[Fit]) -> dict[str, Fit]:
+    """Best sparse fit (on few runs) of every effect that p_m can make up for, by name; of variants in shape the stated one.
 
     fits : found so far.
     """
@@ -62,9 +62,13 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
     top = max([nominal.evidence, *(fit.evidence for fit in fits)])
     for score in screening.scores:
         name = score.name
-        if not bench.costs_runs(name) or bench.effects[name].kind not in EXPLORED or cause(name) != name:
+        if (
+            not problem.affects_simulation(name)
+            or problem.effects[name].kind not in EXPLORED
+            or cause(name) != name
+        ):
             continue
-        fit = fit_from_strengths(bench, nominal, (name,), top)
+        fit = fit_from_strengths(problem, nominal, (name,), top)
         if fit is not None:
             found[name] = fit
             top = max(top, fit.evidence)
@@ -72,43 +76,43 @@ def explore(bench: Workbench, nominal: Fit, screening: Screening, fits: Sequence
 
 
 def fit_from_strengths(
-    bench: Workbench, nominal: Fit, names: Hypothesis, top: float, factors: Sequence[float] = FACTORS
+    problem: Problem, nominal: Fit, names: Hypothesis, top: float, factors: Sequence[float] = FACTORS
 ) -> Fit | None:
-    """The best coarse fit of one hypothesis from several strengths; None where its runs lead nowhere.
+    """The best sparse fit of one hypothesis from several strengths; None where its runs lead nowhere.
 
     top : ln evidence of the best that is known; a start far behind it is not followed. factors : on the nominal p_m.
     """
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     found: Fit | None = None
     for shift in np.log(factors):
         start = nominal.log_p_m + float(shift)
         if shift != 0.0 and not low <= start <= high:
             continue
         with suppress(ExtrapolationError):  # runs that lead nowhere: not from this start
-            begin = (start, _start_at(bench, nominal, names, start))
+            begin = (start, _start_at(problem, nominal, names, start))
             fit = fit_hypothesis(
-                bench,
+                problem,
                 names,
                 begin,
-                coarse=True,
+                sparse=True,
                 nuisances=nominal,
                 iterations=FIRST_STEPS,
                 least=top - NOWHERE,
             )
             if fit.evidence > top - HOPELESS:
                 begin = (fit.log_p_m, fit.values)
-                fit = fit_hypothesis(bench, names, begin, coarse=True, nuisances=fit)
+                fit = fit_hypothesis(problem, names, begin, sparse=True, nuisances=fit)
             found = fit if found is None or fit.evidence > found.evidence else found
             top = max(top, fit.evidence)
     return found
 
 
-def _start_at(bench: Workbench, nominal: Fit, names: Hypothesis, log_p_m: float) -> dict[str, float]:
+def _start_at(problem: Problem, nominal: Fit, names: Hypothesis, log_p_m: float) -> dict[str, float]:
     """Amplitudes that the data ask for at a strength, by the tangents there, within two of their steps."""
-    parameters = {name: bench.effects[name].amplitudes[0] for name in names}
-    costly = [name for name in names if bench.costs_runs(name)]
-    bench.require_fingerprints(costly, log_p_m, f"{' and '.join(names)} at another p_m")
-    blocks = with_probes(bench, nominal, names, log_p_m)
+    parameters = {name: problem.effects[name].amplitudes[0] for name in names}
+    costly = [name for name in names if problem.affects_simulation(name)]
+    problem.require_fingerprints(costly, log_p_m, f"{' and '.join(names)} at another p_m")
+    blocks = with_perturbations(problem, nominal, names, log_p_m)
     step, *_ = solve_globals(blocks, names, {name: (0.0, each.scale) for name, each in parameters.items()})
     reach = {name: 2 * abs(each.step) for name, each in parameters.items()}
     return {

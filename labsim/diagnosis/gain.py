@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from ..inference.fits.fitting import Fit, fit_hypothesis
-from ..inference.workbench import Workbench
+from ..inference.problem import Problem
 from ..records import FloatArray
 
 DRAWS = 4000  # of the null law
@@ -66,7 +66,7 @@ class _HeldDrop:
 
 
 def _hold_out(
-    bench: Workbench, fit: Fit, known: bool, groups: Sequence[Sequence[str]]
+    problem: Problem, fit: Fit, known: bool, groups: Sequence[Sequence[str]]
 ) -> tuple[list[_HeldDrop], FloatArray, FloatArray]:
     """Every group of drops held out, by the names of their records; what scans and priors say of the globals: pull (k,) and
     precision (k, k)."""
@@ -76,7 +76,7 @@ def _hold_out(
     precision = np.zeros((len(names), len(names)))
     pull = np.zeros(len(names))
     for k, name in enumerate(names[1:], start=1):
-        width = bench.effects[name].amplitudes[0].scale
+        width = problem.effects[name].amplitudes[0].scale
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
     for block in fit.blocks[1:]:  # only drops are held out
@@ -85,7 +85,7 @@ def _hold_out(
         precision += columns.T @ solved
         pull += solved.T @ block.residual
     drops = []
-    models = {model.observed.name: model for model in bench.tracks.models}
+    models = {model.observed.name: model for model in problem.tracks.models}
     for records in groups:
         held = np.zeros(linear.residual.size, dtype=bool)
         for name in records:
@@ -104,23 +104,23 @@ def _hold_out(
     return drops, pull, precision
 
 
-def hold_out_folds(bench: Workbench, fit: Fit) -> HeldOut:
+def hold_out_folds(problem: Problem, fit: Fit) -> HeldOut:
     """Leave a fifth of the drops out at a time, repeat the fit with its runs without them, predict them."""
-    models, samples = bench.tracks.models, list(bench.tracks.samples.items())
+    models, samples = problem.tracks.models, list(problem.tracks.samples.items())
     if len(samples) < 2:
-        return predict_held_out(bench, fit)
+        return predict_held_out(problem, fit)
     parts = []
     for k in range(min(FOLDS, len(samples))):
         fold = [name for _, records in samples[k::FOLDS] for name in records]
         kept = [j for j, model in enumerate(models) if model.observed.name not in fold]
-        rest = replace(bench.tracks, models=tuple(models[j] for j in kept))
-        without = replace(bench, observations=(rest, *bench.observations[1:]))
+        rest = replace(problem.tracks, models=tuple(models[j] for j in kept))
+        without = replace(problem, observations=(rest, *problem.observations[1:]))
         start = replace(fit, nuisances=(fit.nuisances[0][kept], *fit.nuisances[1:]))
         again = fit_hypothesis(without, fit.hypothesis, (fit.log_p_m, fit.values), nuisances=start)
         there = fit_hypothesis(
-            bench, fit.hypothesis, (again.log_p_m, again.values), nuisances=fit, iterations=0
+            problem, fit.hypothesis, (again.log_p_m, again.values), nuisances=fit, iterations=0
         )
-        parts.append(predict_held_out(bench, there, groups=[fold]))
+        parts.append(predict_held_out(problem, there, groups=[fold]))
     return HeldOut(
         tuple(name for part in parts for name in part.names),
         *(
@@ -131,20 +131,20 @@ def hold_out_folds(bench: Workbench, fit: Fit) -> HeldOut:
 
 
 def predict_held_out(
-    bench: Workbench, fit: Fit, *, known: bool = False, groups: Sequence[Sequence[str]] = ()
+    problem: Problem, fit: Fit, *, known: bool = False, groups: Sequence[Sequence[str]] = ()
 ) -> HeldOut:
     """Leave each drop out, fit the globals to the others, predict its motion below the surface.
 
     A single drop leaves nothing to predict it from: its figures are NaN. known : the globals are held where the fit has them.
     groups : names of records that are left out together, in place of those of one drop each.
     """
-    names = tuple(", ".join(group) for group in groups) or tuple(bench.tracks.samples)
-    groups = groups or list(bench.tracks.samples.values())
-    if len(bench.tracks.samples) < 2:
+    names = tuple(", ".join(group) for group in groups) or tuple(problem.tracks.samples)
+    groups = groups or list(problem.tracks.samples.values())
+    if len(problem.tracks.samples) < 2:
         nothing = np.full(1, math.nan)
         return HeldOut(names, nothing, nothing, nothing, np.ones(1))
     rms, expected, score, count = [], [], [], []
-    drops, pull, _precision = _hold_out(bench, fit, known, groups)
+    drops, pull, _precision = _hold_out(problem, fit, known, groups)
     for drop in drops:
         error = drop.miss(fit.drops.residual, pull)
         lower = np.linalg.cholesky(drop.spread)
@@ -158,15 +158,15 @@ def predict_held_out(
     return HeldOut(names, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
 
 
-def check_prediction(bench: Workbench, fit: Fit, random: np.random.Generator, draws: int = DRAWS) -> float:
+def check_prediction(problem: Problem, fit: Fit, random: np.random.Generator, draws: int = DRAWS) -> float:
     """p value: how often held-out drops of a true model miss by as much, in the mean square over all of them.
 
     A fault that is smooth along the way is a few directions among hundreds of data, where χ² does not show it; what one drop
     says of another is few numbers. Its null law is drawn: data of the fitted model's own covariance. 1 with a single drop.
     """
-    if len(bench.tracks.samples) < 2:
+    if len(problem.tracks.samples) < 2:
         return 1.0
-    drops, pull, precision = _hold_out(bench, fit, False, list(bench.tracks.samples.values()))
+    drops, pull, precision = _hold_out(problem, fit, False, list(problem.tracks.samples.values()))
     lower = np.tril(fit.drops.lower)
     residuals = lower @ random.standard_normal((len(lower), draws))
     values, axes = np.linalg.eigh(precision)

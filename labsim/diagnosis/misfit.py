@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from ..inference.fits.blocks import Block
 from ..inference.fits.fitting import DOUBTFUL, Fit, rate_block
 from ..inference.observations.compacted_zone import CompactedZone, CompactedZones
-from ..inference.workbench import Workbench
+from ..inference.problem import Problem
 from ..records import FloatArray
 
 CLEAR = 3.0  # standard deviations of the mean of a region from which it is named
@@ -48,10 +48,10 @@ class Part:
         return self.p_value < DOUBTFUL
 
 
-def measure_misfit(bench: Workbench, fit: Fit) -> list[Part]:
+def measure_misfit(problem: Problem, fit: Fit) -> list[Part]:
     """Every observation, with every drop and map by itself."""
     parts = []
-    for observation, block in zip(bench.observations, fit.blocks, strict=True):
+    for observation, block in zip(problem.observations, fit.blocks, strict=True):
         sections = []
         for name, section in block.sections.items():
             own = Block(block.residual[section], block.covariance[section, section], {})

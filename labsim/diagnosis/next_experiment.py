@@ -1,6 +1,6 @@
 """Which further measurement would best tell the remaining causes apart: expected information, in bits.
 
-Each hypothesis still standing predicts every candidate; candidates are drops of the families at speeds on the grid, repeats
+Each hypothesis still standing predicts every candidate; candidates are drops of the groups at speeds on the grid, repeats
 included. The expected information is bounded below by Kolchinsky & Tracey (2017), Entropy 19, 361, for Gaussians of equal
 covariance: -Σ p_j ln Σ p_k exp(-D²_jk/8).
 """
@@ -16,7 +16,7 @@ from ..calibrated import read_value
 from ..inference.emulation.curves import FRACTIONS
 from ..inference.fits.fitting import Fit
 from ..inference.observations.observe import ObservedDrop
-from ..inference.workbench import Workbench
+from ..inference.problem import Problem
 from ..records import STANDARD_GRAVITY, FloatArray
 
 USUAL_SIGMA = 2e-6  # m, of a camera where no drop had one
@@ -46,28 +46,28 @@ class Suggestion:
 
 
 def suggest(
-    bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ...], float]
+    problem: Problem, fits: list[Fit], probabilities: dict[tuple[str, ...], float]
 ) -> list[Suggestion]:
     """Best first. fits: hypotheses with a prediction (the nominal one has the empty name)."""
     standing = [fit for fit in fits if probabilities.get(fit.hypothesis or ("none",), 0.0) > SMALLEST]
     found = [
         each
-        for number, family in enumerate(bench.families)
-        if family.pushed
-        for each in _suggest_pushes(bench, fits, probabilities, number)
+        for number, group in enumerate(problem.groups)
+        if group.pushed
+        for each in _suggest_pushes(problem, fits, probabilities, number)
     ]
     if len(standing) < 2:
         return found
     weight = np.array([probabilities[fit.hypothesis or ("none",)] for fit in standing])
     weight /= weight.sum()
-    for number, family in enumerate(bench.families):
-        if family.is_scan or family.pushed:
+    for number, group in enumerate(problem.groups):
+        if group.is_scan or group.pushed:
             continue
-        for speed in family.speeds[1:]:
-            means = np.stack([_predict(bench, fit, number, speed) for fit in standing])
-            spread = _spread(bench, standing, number, speed, means.mean(axis=0))
+        for speed in group.speeds[1:]:
+            means = np.stack([_predict(problem, fit, number, speed) for fit in standing])
+            spread = _spread(problem, standing, number, speed, means.mean(axis=0))
             bits = expected_information(means, spread, weight)
-            p = family.projectile
+            p = group.projectile
             found.append(
                 Suggestion(
                     f"one more drop with the {2e3 * p.tip_radius:.3g} mm tip of {p.mass * 1e6:.3g} mg at {speed:.2f} m/s "
@@ -80,7 +80,7 @@ def suggest(
 
 
 def _suggest_pushes(
-    bench: Workbench, fits: list[Fit], probabilities: dict[tuple[str, ...], float], number: int
+    problem: Problem, fits: list[Fit], probabilities: dict[tuple[str, ...], float], number: int
 ) -> list[Suggestion]:
     """As many pushes at the slowest and at the fastest speed, near each other, as tell the first cause from the most
     probable other that speed shows by DECIDED standard deviations.
@@ -89,28 +89,28 @@ def _suggest_pushes(
     was not fitted is taken as large as its prior expects.
     """
     pushes = sorted(
-        (dict(drop.motion.values)["speed"], drop.name) for drop in bench.campaign.drops if drop.gauge
+        (dict(drop.motion.values)["speed"], drop.name) for drop in problem.campaign.drops if drop.gauge
     )
     (slow, first), (fast, last) = pushes[0], pushes[-1]
     if slow == fast:
         return []
     fitted = {fit.hypothesis: fit.values for fit in fits}
-    table, place = bench.tracks.features[number].table, next(iter(bench.places.values()))
+    table, place = problem.tracks.features[number].table, next(iter(problem.places.values()))
     ratios, weights, names_of = [], [], []
     for hypothesis, probability in probabilities.items():
         if probability < SMALLEST or hypothesis == ("unknown",):
             continue
         names = () if hypothesis == ("none",) else hypothesis
-        usual = {name: bench.effects[name].amplitudes[0].scale for name in names}
+        usual = {name: problem.effects[name].amplitudes[0].scale for name in names}
         own = fitted.get(names, usual)
         values = {name: own[name] if abs(own[name]) > 0.1 * usual[name] else usual[name] for name in names}
         ends = []
         for speed, push in ((slow, first), (fast, last)):
-            state = bench.state(bench.families[number], push)
+            state = problem.state(problem.groups[number], push)
             changed = state
             for name in names:
-                if bench.strength_only(name):
-                    changed = bench.effects[name].apply(changed, bench.at(name, values[name]), place)
+                if problem.rescales_p_m(name):
+                    changed = problem.effects[name].apply(changed, problem.at(name, values[name]), place)
             shift = math.log(read_value(changed.material) / read_value(state.material))
             ends.append(table.code(fits[0].log_p_m + shift, math.log(speed), values)[0])
         ratios.append(ends[1] - ends[0])
@@ -123,9 +123,9 @@ def _suggest_pushes(
     if not likely.any():
         return []
     rival = int(np.argmax(likely))
-    count = max(1, math.ceil(2.0 * (DECIDED * bench.terms.scatter / apart[rival]) ** 2))
+    count = max(1, math.ceil(2.0 * (DECIDED * problem.budget.scatter / apart[rival]) ** 2))
     best = int(np.argmax(weights))
-    spread = np.array([[2.0 * bench.terms.scatter**2 / count]])
+    spread = np.array([[2.0 * problem.budget.scatter**2 / count]])
     bits = expected_information(np.array(ratios)[:, None], spread, np.array(weights) / sum(weights))
     return [
         Suggestion(
@@ -147,26 +147,26 @@ def expected_information(means: FloatArray, spread: FloatArray, weight: FloatArr
     return -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
 
 
-def _predict(bench: Workbench, fit: Fit, number: int, speed: float, shift: float = 0.0) -> FloatArray:
+def _predict(problem: Problem, fit: Fit, number: int, speed: float, shift: float = 0.0) -> FloatArray:
     """Depths (m) on the stated scale at fractions of the stop that the fit itself predicts, and the stop (as a length, m).
 
     shift : of ln p_m from the fit's.
     """
-    code = bench.tracks.features[number].table.code(fit.log_p_m + shift, math.log(speed), fit.values)
-    instrument = next(iter(bench.instruments(fit.values).values()))
+    code = problem.tracks.features[number].table.code(fit.log_p_m + shift, math.log(speed), fit.values)
+    instrument = next(iter(problem.instruments(fit.values).values()))
     depth, stop = math.exp(code[0]), math.exp(code[1])
     shape = np.interp(POINTS, FRACTIONS, code[2:])
     return np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
 
 
-def _spread(bench: Workbench, fits: list[Fit], number: int, speed: float, mean: FloatArray) -> FloatArray:
+def _spread(problem: Problem, fits: list[Fit], number: int, speed: float, mean: FloatArray) -> FloatArray:
     """Covariance of such a measurement: localisation, sample scatter, numerical error, uncertainty of p_m."""
-    base, moved = (_predict(bench, fits[0], number, speed, shift) for shift in (0.0, 0.01))
+    base, moved = (_predict(problem, fits[0], number, speed, shift) for shift in (0.0, 0.01))
     tangent = (moved - base) / 0.01
-    cameras = [drop.sigma for drop in bench.drops if isinstance(drop, ObservedDrop)]
+    cameras = [drop.sigma for drop in problem.drops if isinstance(drop, ObservedDrop)]
     white = np.median(cameras) if cameras else USUAL_SIGMA
-    variance = bench.terms.scatter**2 + fits[0].covariance[0, 0]
-    numerical = bench.terms.numerical * mean
+    variance = problem.budget.scatter**2 + fits[0].covariance[0, 0]
+    numerical = problem.budget.numerical * mean
     return (
         white**2 * np.eye(len(mean)) + variance * np.outer(tangent, tangent) + np.outer(numerical, numerical)
     )

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import ExtrapolationError
 from ..inference.fits.fitting import Fit, Hypothesis, fit_hypothesis
-from ..inference.fits.settle import list_large, settle
-from ..inference.workbench import Workbench
+from ..inference.fits.refine import list_large_effects, refine
+from ..inference.problem import Problem
 from .screen import CLOSE, Screening, screen, screen_pairs
 
 MOST_PAIRS = 3  # partners of one single
@@ -22,32 +22,32 @@ NOTHING = 2.0  # standard deviations within which an effect of a pair is as good
 
 
 def confirm_pairs(
-    bench: Workbench, nominal: Fit, singles: list[Fit], screening: Screening, without_place: float
+    problem: Problem, nominal: Fit, singles: list[Fit], screening: Screening, log_evidence_unknown: float
 ) -> list[Fit]:
     """Pairs that the linear screening asks for: partners of the best singles, and those that only work together.
 
-    None is worth its runs that does not come near ``without_place``, ln evidence of a law without a name, and no single is worth
-    asking for partners that gains less than SHARE of what that law does.
+    None is worth its runs that does not come near ``log_evidence_unknown``, ln evidence of a law without a name, and no single is
+    worth asking for partners that gains less than SHARE of what that law does.
     """
     ranked = sorted(singles, key=lambda fit: -fit.evidence)
     starts: dict[Hypothesis, Fit] = {}
-    worth = nominal.evidence + SHARE * (without_place - nominal.evidence)
+    worth = nominal.evidence + SHARE * (log_evidence_unknown - nominal.evidence)
     for lead in ranked[:2]:
         if lead.evidence < max(nominal.evidence + LEAST_GAIN, ranked[0].evidence - CLOSE + LEAST_GAIN, worth):
             continue
         name = lead.hypothesis[0]
         # finer runs of every partner would cost more than they say
-        partners = [n for n, effect in bench.effects.items() if n != name and effect.kind != "numerics"]
-        again = screen(bench, lead, np.random.default_rng(0), partners)
-        least = max(LEAST_GAIN, without_place - CLOSE - lead.evidence)
+        partners = [n for n, effect in problem.effects.items() if n != name and effect.kind != "numerics"]
+        again = screen(problem, lead, np.random.default_rng(0), partners)
+        least = max(LEAST_GAIN, log_evidence_unknown - CLOSE - lead.evidence)
         for score in again.scores[:MOST_PAIRS]:
             if score.log_bayes > least and (score.name, name) not in starts:
                 starts[name, score.name] = lead
-    top = max([without_place - CLOSE, *(fit.evidence for fit in ranked[:1])]) - nominal.evidence
+    top = max([log_evidence_unknown - CLOSE, *(fit.evidence for fit in ranked[:1])]) - nominal.evidence
     joint = [
         (pair, log_bayes)
-        for pair, log_bayes in screen_pairs(bench, screening)
-        if not any(bench.effects[name].kind == "numerics" for name in pair)
+        for pair, log_bayes in screen_pairs(problem, screening)
+        if not any(problem.effects[name].kind == "numerics" for name in pair)
     ]
     for pair, log_bayes in joint[:MOST_JOINT]:
         known = any(set(pair) == set(other) for other in starts)
@@ -57,24 +57,24 @@ def confirm_pairs(
     for both, start in starts.items():
         begin = (start.log_p_m, {name: start.values.get(name, 0.0) for name in both})
         with suppress(ExtrapolationError):
-            fits.append(fit_hypothesis(bench, both, begin, nuisances=start))
+            fits.append(fit_hypothesis(problem, both, begin, nuisances=start))
     return fits
 
 
-def settle_leading(
-    bench: Workbench, singles: Sequence[Fit], pairs: Sequence[Fit], without_place: float
+def refine_leading(
+    problem: Problem, singles: Sequence[Fit], pairs: Sequence[Fit], log_evidence_unknown: float
 ) -> list[Fit]:
-    """The pairs; the best, where it leads all singles, is not far behind ``without_place`` and is large, settled."""
+    """The pairs; the best, where it leads all singles, is not far behind ``log_evidence_unknown`` and is large, refined."""
     best = max(pairs, key=lambda fit: fit.evidence, default=None)
-    least = max([without_place - CLOSE, *(fit.evidence for fit in singles)])
-    if best is None or best.evidence < least or not list_large(bench, best):
+    least = max([log_evidence_unknown - CLOSE, *(fit.evidence for fit in singles)])
+    if best is None or best.evidence < least or not list_large_effects(problem, best):
         return list(pairs)
     with suppress(ExtrapolationError):
-        return [settle(bench, best), *(fit for fit in pairs if fit is not best)]
+        return [refine(problem, best), *(fit for fit in pairs if fit is not best)]
     return list(pairs)
 
 
-def return_to_singles(bench: Workbench, singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:
+def return_to_singles(problem: Problem, singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:
     """The singles; where the best pair leads them and one of its effects is as good as absent, the other alone from there.
 
     Two large effects that bend have more than one best place, and a pair may find a better one than its single did.
@@ -88,7 +88,7 @@ def return_to_singles(bench: Workbench, singles: Sequence[Fit], pairs: Sequence[
             continue
         alone = tuple(name for name in best.hypothesis if name != absent)
         with suppress(ExtrapolationError):
-            fit = fit_hypothesis(bench, alone, (best.log_p_m, best.values), nuisances=best)
+            fit = fit_hypothesis(problem, alone, (best.log_p_m, best.values), nuisances=best)
             if alone not in known or fit.evidence > known[alone].evidence:
                 known[alone] = fit
     return list(known.values())

@@ -1,6 +1,6 @@
 """Which effects could explain what the nominal fit leaves? Score tests on whitened, projected tangents.
 
-Input: a Workbench and the nominal Fit. Output: a Screening with, for every effect, how far its fingerprint (the tangent after
+Input: a Problem and the nominal Fit. Output: a Screening with, for every effect, how far its fingerprint (the tangent after
 ln p_m and all nuisances are taken out) lies along the residual, what amplitude that asks for, and how alike the
 fingerprints are. Formulas: docs/diagnosis-method.md; Rao's score test, linear Gaussian Bayes factor, where ln p_m ends with its
 range and amplitudes with their limits.
@@ -16,8 +16,8 @@ import numpy as np
 
 from ..inference.fits.blocks import whiten_all
 from ..inference.fits.evidence import integrate_linear, log_share_inside
-from ..inference.fits.fitting import Fit, with_probes
-from ..inference.workbench import Workbench
+from ..inference.fits.fitting import Fit, with_perturbations
+from ..inference.problem import Problem
 from ..records import FloatArray
 
 DRAWS = 20_000
@@ -58,13 +58,13 @@ class Screening:
     traded: FloatArray
 
 
-def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str] | None = None) -> Screening:
+def screen(problem: Problem, fit: Fit, rng: np.random.Generator, names: list[str] | None = None) -> Screening:
     """Tangents of all effects at the nominal fit (runs at one amplitude and one p_m each) and their scores."""
-    names = [name for name in (names or bench.effects) if bench.effects[name].amplitudes]
-    simulated = [name for name in names if bench.costs_runs(name)]
-    bench.require_fingerprints(simulated, fit.log_p_m, "what each cause changes")
-    names = [name for name in names if name not in simulated or has_runs(bench, name)]
-    whitened = whiten_all(with_probes(bench, fit, names), ["ln_p_m", *names])
+    names = [name for name in (names or problem.effects) if problem.effects[name].amplitudes]
+    simulated = [name for name in names if problem.affects_simulation(name)]
+    problem.require_fingerprints(simulated, fit.log_p_m, "what each cause changes")
+    names = [name for name in names if name not in simulated or has_runs(problem, name)]
+    whitened = whiten_all(with_perturbations(problem, fit, names), ["ln_p_m", *names])
     sigma = 1.0 / float(np.linalg.norm(whitened[:, 1]))
     direction = whitened[:, 1] * sigma
     along = direction @ whitened
@@ -95,24 +95,24 @@ def screen(bench: Workbench, fit: Fit, rng: np.random.Generator, names: list[str
     )
     scores = []
     for k, name in enumerate(names):
-        log_bayes = compare_linear(bench, found, [k]) + bench.shape_evidence.get(name, 0.0)
+        log_bayes = compare_linear(problem, found, [k]) + problem.shape_evidence.get(name, 0.0)
         scores.append(Score(name, float(z[k]), float(lengths[k]), float(z[k] / lengths[k]), log_bayes))
     return replace(found, scores=sorted(scores, key=lambda score: -score.log_bayes))
 
 
-def compare_linear(bench: Workbench, screening: Screening, chosen: Sequence[int]) -> float:
+def compare_linear(problem: Problem, screening: Screening, chosen: Sequence[int]) -> float:
     """ln Bayes factor of the chosen effects, by their places in ``names``, against the nominal model, all of them linear.
 
     Both are integrated over ln p_m inside its range and over amplitudes inside their limits: a nominal fit that its range stops
     is as bad as it is there, and what asks for an amplitude that cannot be explains nothing.
     """
     place = list(chosen)
-    parameters = [bench.effects[screening.names[k]].amplitudes[0] for k in place]
+    parameters = [problem.effects[screening.names[k]].amplitudes[0] for k in place]
     limits = [
         ((each.limits[0] - each.null) / each.scale, (each.limits[1] - each.null) / each.scale)
         for each in parameters
     ]
-    low, high = (math.log(p) - screening.log_p_m for p in bench.campaign.p_m_range)
+    low, high = (math.log(p) - screening.log_p_m for p in problem.campaign.p_m_range)
     widths = [each.scale for each in parameters]
     # data, ln p_m, amplitudes in units of their priors; the first row is all that lies along the tangent of ln p_m
     along = np.concatenate([[screening.step, 1.0], screening.traded[place] * widths]) / screening.sigma
@@ -130,19 +130,19 @@ def compare_linear(bench: Workbench, screening: Screening, chosen: Sequence[int]
     return extended - nominal - cut - 0.5 * len(place) * math.log(2 * math.pi)
 
 
-def screen_pairs(bench: Workbench, screening: Screening) -> list[tuple[tuple[str, str], float]]:
+def screen_pairs(problem: Problem, screening: Screening) -> list[tuple[tuple[str, str], float]]:
     """ln Bayes factors of all pairs against the nominal model, linear, best first."""
     found = [
-        ((first, screening.names[j]), compare_linear(bench, screening, (i, j)))
+        ((first, screening.names[j]), compare_linear(problem, screening, (i, j)))
         for i, first in enumerate(screening.names)
         for j in range(i + 1, len(screening.names))
     ]
     return sorted(found, key=lambda item: -item[1])
 
 
-def has_runs(bench: Workbench, name: str) -> bool:
+def has_runs(problem: Problem, name: str) -> bool:
     """Whether an effect's runs gave every projectile something to compare."""
-    return all(each.table.knows(name) for each in bench.features)
+    return all(each.table.knows(name) for each in problem.features)
 
 
 def list_confusable(screening: Screening) -> list[tuple[str, str, float]]:

@@ -18,7 +18,7 @@ from ..effects import Effect, Parameter
 from ..inference.fits.blocks import solve_globals
 from ..inference.fits.fitting import Fit
 from ..inference.fits.tangents import linearise_alone
-from ..inference.workbench import Workbench
+from ..inference.problem import Problem
 from .screen import Screening
 
 QUANTILES = (1 / 6, 5 / 6)  # with the stated value, the thirds of the prior
@@ -30,19 +30,19 @@ def shape_parameter(effect: Effect) -> Parameter | None:
     return next((parameter for parameter in effect.parameters if parameter.shape), None)
 
 
-def lay_out_shapes(bench: Workbench) -> None:
-    """Settle shapes from the undisturbed dust, add variants of the others to the workbench's effects."""
-    for name, effect in list(bench.effects.items()):
+def lay_out_shapes(problem: Problem) -> None:
+    """Settle shapes from the undisturbed dust, add variants of the others to the problem's effects."""
+    for name, effect in list(problem.effects.items()):
         parameter = shape_parameter(effect)
         if parameter is None or not effect.amplitudes:
             continue
-        if _shows_in_dust(bench, name):
-            _settle(bench, name, parameter)
+        if _shows_in_dust(problem, name):
+            _settle(problem, name, parameter)
             continue
         low, high = (float(parameter.prior.cdf(limit)) for limit in parameter.limits)
         for quantile in QUANTILES:
             value = float(f"{float(parameter.prior.ppf(low + (high - low) * quantile)):.2g}")
-            bench.effects[f"{name}{MARK}{value:g}"] = effect.with_shape(value)
+            problem.effects[f"{name}{MARK}{value:g}"] = effect.with_shape(value)
 
 
 def cause(name: str) -> str:
@@ -50,27 +50,27 @@ def cause(name: str) -> str:
     return name.split(MARK)[0]
 
 
-def _shows_in_dust(bench: Workbench, name: str) -> bool:
-    dust = bench.layering
+def _shows_in_dust(problem: Problem, name: str) -> bool:
+    dust = problem.layering
     if dust is None:
         return False
-    block = linearise_alone(bench, dust, {}, {name: bench.effects[name].amplitudes[0].step})
+    block = linearise_alone(problem, dust, {}, {name: problem.effects[name].amplitudes[0].step})
     return bool(np.any(block.tangents[name] != 0.0))
 
 
-def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
+def _settle(problem: Problem, name: str, parameter: Parameter) -> None:
     """Best shape by the undisturbed dust alone, with its amplitude free; its prior's price goes to shape_evidence."""
-    effect, dust = bench.effects[name], bench.layering
+    effect, dust = problem.effects[name], problem.layering
     assert dust is not None
     width = effect.amplitudes[0].scale
 
     def cost(log_shape: float) -> float:
-        bench.effects[name] = effect.with_shape(math.exp(log_shape))
-        block = linearise_alone(bench, dust, {}, {name: 0.05 * effect.amplitudes[0].step})
+        problem.effects[name] = effect.with_shape(math.exp(log_shape))
+        block = linearise_alone(problem, dust, {}, {name: 0.05 * effect.amplitudes[0].step})
         _step, _cov, chi, _det, _w = solve_globals([block], [name], {name: (0.0, width)})
         return chi - 2 * float(parameter.log_prior(math.exp(log_shape)))
 
-    plain = linearise_alone(bench, dust, {}, {}).chi_square
+    plain = linearise_alone(problem, dust, {}, {}).chi_square
     low, high = (math.log(max(limit, 1e-12)) for limit in parameter.limits)
     grid = np.linspace(low, high, 25)[1:-1]
     values = [cost(x) for x in grid]
@@ -80,24 +80,24 @@ def _settle(bench: Workbench, name: str, parameter: Parameter) -> None:
     )
     drop = plain - (best.fun + 2 * float(parameter.log_prior(math.exp(best.x))))
     if drop < CLEAR:
-        bench.effects[name] = effect
+        problem.effects[name] = effect
         return
     step = 0.02
     curvature = (cost(best.x + step) + cost(best.x - step) - 2 * best.fun) / step**2 / 2
     sigma = math.exp(best.x) / math.sqrt(max(curvature, 1.0))
     price = float(parameter.log_prior(math.exp(best.x))) + 0.5 * math.log(2 * math.pi) + math.log(sigma)
-    bench.effects[name] = effect.with_shape(float(f"{math.exp(best.x):.3g}"))
-    bench.shape_evidence[name] = min(price, 0.0)
+    problem.effects[name] = effect.with_shape(float(f"{math.exp(best.x):.3g}"))
+    problem.shape_evidence[name] = min(price, 0.0)
 
 
 def merge_variants(
-    bench: Workbench,
+    problem: Problem,
     nominal: Fit,
     fits: Sequence[Fit],
     screening: Screening,
     explored: Mapping[str, Fit],
 ) -> tuple[list[Fit], Screening]:
-    """One fit and one score per cause. The best variant takes the cause's name in the workbench; evidences are averaged."""
+    """One fit and one score per cause. The best variant takes the cause's name in the problem; evidences are averaged."""
     fitted = {fit.hypothesis[0]: fit for fit in fits}
     scores = {score.name: score for score in screening.scores}
     groups: dict[str, list[str]] = {}
@@ -114,13 +114,13 @@ def merge_variants(
         best = max(candidates, key=lambda name: evidence[name])
         kept.append((best, base, mean - nominal.evidence))
         if best != base:
-            _take_name(bench, best, base)
+            _take_name(problem, best, base)
         if best in fitted:
             over = weigh_shapes([fitted[name] for name in variants if name in fitted], fitted[best])
             merged.append(replace(_rename(fitted[best], best, base), evidence=mean, over_shapes=over))
         for name in variants:
             if name != base:
-                bench.effects.pop(name, None)
+                problem.effects.pop(name, None)
     chosen = {best: (base, log_bayes) for best, base, log_bayes in kept}
     positions = [k for k, name in enumerate(screening.names) if name in chosen]
     return merged, replace(
@@ -157,14 +157,14 @@ def _evidence(
     return nominal.evidence + log_bayes
 
 
-def _take_name(bench: Workbench, variant: str, base: str) -> None:
-    bench.effects[base] = bench.effects[variant]
-    for each in bench.features:
+def _take_name(problem: Problem, variant: str, base: str) -> None:
+    problem.effects[base] = problem.effects[variant]
+    for each in problem.features:
         for kept in (each.table.changes, each.table.fingerprints):
             kept.pop(base, None)
             if variant in kept:
                 kept[base] = kept.pop(variant)
-    bench.renamed[base] = variant
+    problem.renamed[base] = variant
 
 
 def _rename(fit: Fit, before: str, after: str) -> Fit:

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..calibrated import show_parameter
 from ..inference.fits.blocks import whiten_all
-from ..inference.fits.fitting import Fit, with_probes
-from ..inference.workbench import Workbench
+from ..inference.fits.fitting import Fit, with_perturbations
+from ..inference.problem import Problem
 from .screen import has_runs
 from .shapes import cause
 
@@ -53,21 +53,21 @@ class Combination:
     sigma: float
 
 
-def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
+def list_untestable(problem: Problem, fit: Fit) -> list[Untestable]:
     """Every effect beside those of the fit that moves p_m, unseen, out of its 90 % interval; the widest p_m first. Of one with a
     shape, the stated shape stands for all."""
     names = [
         name
-        for name, effect in bench.effects.items()
+        for name, effect in problem.effects.items()
         if effect.amplitudes
         and name not in fit.hypothesis
         and effect.kind != "numerics"
         and cause(name) == name
     ]
-    names = [name for name in names if not bench.costs_runs(name) or has_runs(bench, name)]
+    names = [name for name in names if not problem.affects_simulation(name) or has_runs(problem, name)]
     known = ["ln_p_m", *fit.hypothesis]
-    tangents = whiten_all(with_probes(bench, fit, names), [*known, *names])[:, 1:]
-    scales = np.array([bench.effects[name].amplitudes[0].scale for name in fit.hypothesis])
+    tangents = whiten_all(with_perturbations(problem, fit, names), [*known, *names])[:, 1:]
+    scales = np.array([problem.effects[name].amplitudes[0].scale for name in fit.hypothesis])
     priors = np.hstack(
         [np.zeros((len(scales), 1)), np.diag(1.0 / scales), np.zeros((len(scales), len(names)))]
     )
@@ -76,11 +76,11 @@ def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
     left = np.linalg.norm(rows[:, len(known) :] - rows[:, : len(known)] @ followed, axis=0)
     found = []
     for name, length, traded in zip(names, left, followed[0], strict=True):
-        parameter = bench.effects[name].amplitudes[0]
+        parameter = problem.effects[name].amplitudes[0]
         size = min(parameter.scale, SEEN / max(length, 1e-300))
         values = [parameter.hold(side * size) for side in (-1.0, 0.0, 1.0)]
         implied = np.exp(fit.log_p_m - traded * (np.array(values) - parameter.null))
-        implied = np.clip(implied, *bench.campaign.p_m_range)
+        implied = np.clip(implied, *problem.campaign.p_m_range)
         each = Untestable(
             name,
             float(length * size),
@@ -93,18 +93,18 @@ def list_untestable(bench: Workbench, fit: Fit) -> list[Untestable]:
     return sorted(found, key=lambda each: -each.width)
 
 
-def find_combination(bench: Workbench, fit: Fit, untestable: list[Untestable]) -> Combination | None:
+def find_combination(problem: Problem, fit: Fit, untestable: list[Untestable]) -> Combination | None:
     """p_m with what the first of the untestable causes takes; None where everything is testable."""
     if not untestable:
         return None
     name, power = untestable[0].name, untestable[0].traded
-    parameter = bench.effects[name].amplitudes[0]
+    parameter = problem.effects[name].amplitudes[0]
     full = f"{name}.{parameter.name}"
     # about a null of one the amplitude is the ln of a factor
     amplitude = full if parameter.null == 0.0 else f"({full} - {parameter.null:g})"
     factor = f"{full}^{power:.2f}" if parameter.null == 1.0 else f"exp({power:.3g} * {amplitude})"
     return Combination(
-        f"{show_parameter(bench.campaign.material.law)[0]} * {factor}",
+        f"{show_parameter(problem.campaign.material.law)[0]} * {factor}",
         math.exp(fit.log_p_m),
         math.sqrt(fit.covariance[0, 0]),
     )

@@ -17,8 +17,8 @@ from .contract import (
     deepest_dust,
     deepest_expected,
     find_middle,
+    list_impacts,
     list_places,
-    list_thrown,
 )
 from .loading import CATALOGUE, list_effects, load_effect, load_file, reference_campaign
 from .model import Model, apply_effects, apply_model, check_model, make_instrument, read_model, write_model
@@ -48,8 +48,8 @@ __all__ = [
     "deepest_expected",
     "find_middle",
     "list_effects",
+    "list_impacts",
     "list_places",
-    "list_thrown",
     "load_effect",
     "load_file",
     "make_instrument",

@@ -250,7 +250,7 @@ class Effect:
         return replace(self, parameters=tuple(change(each) for each in self.parameters))
 
     @property
-    def costs_runs(self) -> bool:
+    def affects_simulation(self) -> bool:
         """Whether it changes the drop; otherwise only what is read off the instruments."""
         return self.change_setting is not None
 
@@ -356,7 +356,7 @@ def _list_scans(campaign: Campaign) -> list[Scan | PublishedScan]:
     return [*campaign.scans, *campaign.published_scans]
 
 
-def list_thrown(campaign: Campaign) -> list[tuple[float, float, float]]:
+def list_impacts(campaign: Campaign) -> list[tuple[float, float, float]]:
     """Tip radius (m), mass (kg) and expected speed at contact (m/s) of every drop and scan, from what is stated."""
     return [(each.tip_radius, each.mass, speed) for each, speed in _list_impacts(campaign)]
 
@@ -392,7 +392,7 @@ def deepest_dust(campaign: Campaign) -> float:
     must stay physical down to there."""
     if campaign.geometry == "planar":
         box = campaign.planar
-        return max(box.box_depth * radius / box.box_radius for radius, _, _ in list_thrown(campaign))
+        return max(box.box_depth * radius / box.box_radius for radius, _, _ in list_impacts(campaign))
     return max(setting.extent[1] for setting in _list_settings(campaign, campaign.p_m_range[0]))
 
 
@@ -414,6 +414,6 @@ __all__ = [
     "deepest_dust",
     "deepest_expected",
     "find_middle",
+    "list_impacts",
     "list_places",
-    "list_thrown",
 ]

@@ -20,18 +20,18 @@ from ..own_keys import DUST
 from ..records import Campaign
 from ..runs.store import Progress, RunStore
 from .fits.error_sizes import integrate_sizes
-from .fits.fitting import DOUBTFUL, Fit, fit_hypothesis, goodness_of_fit
+from .fits.fitting import DOUBTFUL, Fit, fit_hypothesis, fit_p_value
 from .fits.posterior import Posterior, sample
-from .fits.settle import list_large, settle
+from .fits.refine import list_large_effects, refine
 from .fits.target import make_target
 from .free_fall import doubt_scales
 from .measure import Measurements, measure
 from .observations.compacted_zone import observe_scan
-from .observations.drop_terms import Terms
-from .open_workbench import open_workbench
-from .scatter import ScatterEstimate, allow_scatter, estimate_scatter, set_terms
+from .observations.linearised_drop import ErrorBudget
+from .open_problem import open_problem
+from .problem import Problem
+from .scatter import ScatterEstimate, allow_scatter, estimate_scatter, set_error_budget
 from .surface_rows import doubt_surface_rows
-from .workbench import Workbench
 
 LEANS = 2.0  # standard errors of ln p_m from an end of its range: one in twenty of the Gaussian is cut off from there on
 UNSETTLED = 0.5  # standard deviations of a parameter
@@ -45,10 +45,10 @@ RUNG = 0.7  # of ln p_m, between two of the strengths that a lost fit to acceler
 
 @dataclass(frozen=True)
 class Calibration:
-    """What calibrate found. scatter : of ln p_m between samples, as the residuals show it; bench.terms has the one in use."""
+    """What calibrate found. scatter : of ln p_m between samples, as the residuals show it; problem.budget has the one in use."""
 
     campaign: Campaign
-    bench: Workbench
+    problem: Problem
     fit: Fit
     posterior: Posterior
     scatter: ScatterEstimate
@@ -68,7 +68,7 @@ def prepare(
     campaign: Campaign,
     store: RunStore,
     *,
-    terms: Terms | None = None,
+    budget: ErrorBudget | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
@@ -76,15 +76,15 @@ def prepare(
     cells: int | None = None,
     measurements: Measurements | None = None,
     model: Model | None = None,
-) -> tuple[Workbench, Fit]:
+) -> tuple[Problem, Fit]:
     """Measure the campaign (where that has not been done) and fit the nominal model."""
     seen = measurements or measure(campaign)
     effects = list_effects(campaign.folder)
-    bench = open_workbench(
+    problem = open_problem(
         campaign,
         store,
         effects,
-        terms=terms,
+        budget=budget,
         workers=workers,
         scheduler=scheduler,
         progress=progress,
@@ -94,39 +94,41 @@ def prepare(
         model=model,
         cells=cells,
     )
-    bench.warnings += seen.warnings
+    problem.warnings += seen.warnings
     middle = math.log(math.sqrt(campaign.p_m_range[0] * campaign.p_m_range[1]))
     dust = campaign.material.law == DUST
     start = max(min(middle, math.log(FIRST_START)), math.log(campaign.p_m_range[0])) if dust else middle
-    nominal = fit_hypothesis(bench, (), (start, {}))
-    if dust and goodness_of_fit(nominal) < LOST:  # Gauss and Newton may have run away
-        nominal = fit_from_afar(bench, nominal)
-    if bench.numerics:
-        bench.require_fingerprints(list(bench.numerics), nominal.log_p_m, "what the solver's settings change")
-        nominal = fit_hypothesis(bench, (), (nominal.log_p_m, {}), nuisances=nominal)
-    return bench, nominal
+    nominal = fit_hypothesis(problem, (), (start, {}))
+    if dust and fit_p_value(nominal) < LOST:  # Gauss and Newton may have run away
+        nominal = fit_from_afar(problem, nominal)
+    if problem.numerics:
+        problem.require_fingerprints(
+            list(problem.numerics), nominal.log_p_m, "what the solver's settings change"
+        )
+        nominal = fit_hypothesis(problem, (), (nominal.log_p_m, {}), nuisances=nominal)
+    return problem, nominal
 
 
-def fit_from_afar(bench: Workbench, nominal: Fit) -> Fit:
+def fit_from_afar(problem: Problem, nominal: Fit) -> Fit:
     """The better of ``nominal`` and of fits from other strengths.
 
     Of accelerometers from where, on a ladder over the range of p_m, the data are least improbable: a drop that is simulated to
     stop before the measured one has no force at all where the data have the largest, and its slope there says nothing.
     """
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
-    if not bench.felt:
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
+    if not problem.felt:
         starts = [math.log(p) for p in OTHER_STARTS if low <= math.log(p) <= high]
-        fits = [nominal, *(fit_hypothesis(bench, (), (start, {})) for start in starts)]
+        fits = [nominal, *(fit_hypothesis(problem, (), (start, {})) for start in starts)]
         return max(fits, key=lambda fit: fit.evidence)
     ladder = np.linspace(low, high, 1 + math.ceil((high - low) / RUNG))
     seen = [nominal]
     for start in ladder:
         with suppress(ExtrapolationError):  # its runs fail: not from there
-            seen.append(fit_hypothesis(bench, (), (float(start), {}), iterations=0))
+            seen.append(fit_hypothesis(problem, (), (float(start), {}), iterations=0))
     best = max(seen, key=lambda fit: fit.evidence)
     if best is nominal:
         return nominal
-    again = fit_hypothesis(bench, (), (best.log_p_m, {}), nuisances=best)
+    again = fit_hypothesis(problem, (), (best.log_p_m, {}), nuisances=best)
     return max((best, again), key=lambda fit: fit.evidence)
 
 
@@ -154,10 +156,10 @@ def calibrate(
     began = time.perf_counter()
     store = store or RunStore()
     names = tuple(name.split(".")[0] for name in parameters if name not in ("p_m", "p_m_Pa"))
-    bench, nominal = prepare(
+    problem, nominal = prepare(
         campaign,
         store,
-        terms=set_terms(campaign),
+        budget=set_error_budget(campaign),
         workers=workers,
         scheduler=scheduler,
         progress=progress,
@@ -169,16 +171,20 @@ def calibrate(
             raise InferenceError(
                 campaign.folder, f"parameter {name}", "is held by the model; leave one of the two out"
             )
-        if name not in bench.effects:
-            reason = bench.reasons.get(name, f"is none of {', '.join(sorted(bench.effects))}")
+        if name not in problem.effects:
+            reason = problem.reasons.get(name, f"is none of {', '.join(sorted(problem.effects))}")
             raise InferenceError(campaign.folder, f"parameter {name}", reason)
-    if STATIC in bench.effects and STATIC not in names and STATIC not in dict(model.effects if model else ()):
+    if (
+        STATIC in problem.effects
+        and STATIC not in names
+        and STATIC not in dict(model.effects if model else ())
+    ):
         names += (STATIC,)
-    fit = fit_hypothesis(bench, names, (nominal.log_p_m, {})) if names else nominal
-    if list_large(bench, fit):
-        fit = settle(bench, fit)
-    usual = bench.terms.scatter, goodness_of_fit(fit)
-    bench, fit, scatter = allow_scatter(bench, fit)
+    fit = fit_hypothesis(problem, names, (nominal.log_p_m, {})) if names else nominal
+    if list_large_effects(problem, fit):
+        fit = refine(problem, fit)
+    usual = problem.budget.scatter, fit_p_value(fit)
+    problem, fit, scatter = allow_scatter(problem, fit)
     doubts = []
     if scatter is not None:
         label, _, _ = show_parameter(campaign.material.law)
@@ -187,26 +193,26 @@ def calibrate(
             f"that are alike (with which p = {usual[1]:.2g}); {label} and its error hold if the samples do differ by as much. A "
             "cause that changes from drop to drop looks the same: labsim diagnose tells them apart"
         )
-    posterior = sample_fit(bench, fit, seed=seed, backend=backend, progress=progress)
-    p_value = goodness_of_fit(fit)
-    doubts += warn_of_range(bench, fit) + warn_unsettled(fit) + doubt_scales(bench.drops)
+    posterior = sample_fit(problem, fit, seed=seed, backend=backend, progress=progress)
+    p_value = fit_p_value(fit)
+    doubts += warn_of_range(problem, fit) + warn_unsettled(fit) + doubt_scales(problem.drops)
     if p_value < DOUBTFUL:
         doubts.append(
             f"the model does not explain the data (p = {p_value:.2g}), so that the error of p_m is too small; labsim "
             "diagnose asks why"
         )
-        doubts += doubt_surface_rows(bench.drops)
+        doubts += doubt_surface_rows(problem.drops)
     return Calibration(
         campaign,
-        bench,
+        problem,
         fit,
         posterior,
-        estimate_scatter(bench, fit),
+        estimate_scatter(problem, fit),
         p_value,
         store.new,
         store.reused,
         time.perf_counter() - began,
-        (*doubts, *warn_unused_scans(bench)),
+        (*doubts, *warn_unused_scans(problem)),
         len(doubts),
     )
 
@@ -221,12 +227,12 @@ def warn_unsettled(fit: Fit) -> list[str]:
     ]
 
 
-def warn_of_range(bench: Workbench, fit: Fit) -> list[str]:
+def warn_of_range(problem: Problem, fit: Fit) -> list[str]:
     """A line where p_m is where its range, more than the data, puts it: at an end, or within LEANS standard errors of one.
 
     A fit does not leave the range; its value, χ² and chain are those of the best p_m inside.
     """
-    low, high = bench.campaign.p_m_range
+    low, high = problem.campaign.p_m_range
     sigma = math.sqrt(fit.covariance[0, 0])
     for end in (low, high):
         apart = abs(fit.log_p_m - math.log(end)) / sigma
@@ -239,11 +245,11 @@ def warn_of_range(bench: Workbench, fit: Fit) -> list[str]:
     return []
 
 
-def warn_unused_scans(bench: Workbench) -> list[str]:
+def warn_unused_scans(problem: Problem) -> list[str]:
     """What was left out of the measurement, one line each."""
-    lines = list(bench.warnings)
-    if bench.undisturbed and not bench.scans:
-        names = ", ".join(dust.name for dust in bench.undisturbed)
+    lines = list(problem.warnings)
+    if problem.undisturbed and not problem.scans:
+        names = ", ".join(dust.name for dust in problem.undisturbed)
         lines.append(
             f"of scans {names} only the undisturbed dust and the point spread enter the likelihood, not the compacted zone"
         )
@@ -251,7 +257,7 @@ def warn_unused_scans(bench: Workbench) -> list[str]:
 
 
 def sample_fit(
-    bench: Workbench,
+    problem: Problem,
     fit: Fit,
     *,
     seed: int = 1,
@@ -263,9 +269,9 @@ def sample_fit(
     p_m is moved and widened, inside its range, by what another code would say, and where the data leave the shape of the
     effect open by what it is with the others.
     """
-    target = make_target(bench, fit)
-    if any(bench.costs_runs(name) for name in fit.hypothesis):
-        target = replace(target, sizes=integrate_sizes(bench, fit, target))
+    target = make_target(problem, fit)
+    if any(problem.affects_simulation(name) for name in fit.hypothesis):
+        target = replace(target, sizes=integrate_sizes(problem, fit, target))
     posterior = sample(
         target.log_probability,
         target.names,
@@ -280,7 +286,7 @@ def sample_fit(
     if width > 0.0:
         name = posterior.names[0]
         p_m = posterior.data.posterior[name]
-        ends = ((np.log(end / p_m.values) - moved) / width for end in bench.campaign.p_m_range)
+        ends = ((np.log(end / p_m.values) - moved) / width for end in problem.campaign.p_m_range)
         other = truncnorm.rvs(*ends, size=p_m.shape, random_state=np.random.default_rng(seed))
         posterior.data.posterior[name] = p_m * np.exp(moved + width * other)
     return posterior

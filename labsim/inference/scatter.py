@@ -1,7 +1,7 @@
 """How much the dust differs from sample to sample is not known beforehand: drops that scatter are no cause.
 
 The scatter of ln p_m is estimated by restricted maximum likelihood (Patterson & Thompson 1971). The likelihood holds the least
-scatter that any dust has (Terms.scatter) or, where a model with a larger one has more evidence, that. Both have the prior
+scatter that any dust has (ErrorBudget.scatter) or, where a model with a larger one has more evidence, that. Both have the prior
 probability of what they stand for, half of a normal distribution. What campaign.toml states is taken as it is.
 """
 
@@ -17,8 +17,8 @@ from scipy.stats import halfnorm
 
 from ..records import Campaign, FloatArray
 from .fits.fitting import Fit, fit_hypothesis
-from .observations.drop_terms import Terms
-from .workbench import Workbench
+from .observations.linearised_drop import ErrorBudget
+from .problem import Problem
 
 WIDTH = 0.05  # of the prior of the scatter of ln p_m, half-normal: sieved dust of one batch 2 %, poured soils 10 %
 APART = 1.5  # ratio of two scatters that are told apart
@@ -56,7 +56,7 @@ class ScatterEstimate:
         return {"mean": self.mean, "sd": self.sd, **quantiles}
 
 
-def estimate_scatter(bench: Workbench, fit: Fit) -> ScatterEstimate:
+def estimate_scatter(problem: Problem, fit: Fit) -> ScatterEstimate:
     """Scatter of ln p_m between samples by restricted maximum likelihood, with a flat prior.
 
     The likelihood is evaluated on a ladder of scatters with everything else as fitted; the drops' offsets enter through the
@@ -64,9 +64,9 @@ def estimate_scatter(bench: Workbench, fit: Fit) -> ScatterEstimate:
     """
     drops = fit.drops
     tangent = drops.tangents["ln_p_m"]
-    used = bench.terms.scatter
-    offsets = np.zeros((len(tangent), len(bench.tracks.samples)))  # one sample's, by columns
-    for column, records in zip(offsets.T, bench.tracks.samples.values(), strict=True):
+    used = problem.budget.scatter
+    offsets = np.zeros((len(tangent), len(problem.tracks.samples)))  # one sample's, by columns
+    for column, records in zip(offsets.T, problem.tracks.samples.values(), strict=True):
         for name in records:
             column[drops.sections[name]] = tangent[drops.sections[name]]
     together = offsets @ offsets.T
@@ -89,42 +89,42 @@ def weigh_least(value: float) -> Scatter:
     return Scatter(value, float(halfnorm.logcdf(APART * value, scale=WIDTH)))
 
 
-def find_scatter(bench: Workbench, fit: Fit) -> Scatter:
+def find_scatter(problem: Problem, fit: Fit) -> Scatter:
     """What the residuals of a fit ask for: their mean, which stands for every scatter, by prior and likelihood."""
-    found = estimate_scatter(bench, fit)
+    found = estimate_scatter(problem, fit)
     step = found.values[1] - found.values[0]
     likelihood = found.weights / np.interp(found.mean, found.values, found.weights)
     prior = halfnorm.pdf(found.values, scale=WIDTH)
     return Scatter(found.mean, math.log(step * (likelihood @ prior)))
 
 
-def find_larger(least: Scatter, bench: Workbench, fit: Fit) -> Scatter | None:
+def find_larger(least: Scatter, problem: Problem, fit: Fit) -> Scatter | None:
     """The scatter that a fit asks for, where it is told apart from the least one and no other is stated."""
-    if bench.campaign.sample.scatter is not None:
+    if problem.campaign.sample.scatter is not None:
         return None
-    asked = find_scatter(bench, fit)
+    asked = find_scatter(problem, fit)
     return asked if asked.value > APART * least.value else None
 
 
-def fit_with(scatter: Scatter, bench: Workbench, fit: Fit) -> tuple[Workbench, Fit]:
-    """The same hypothesis with another scatter in the likelihood, and the workbench with it."""
-    other = replace(bench, terms=replace(bench.terms, scatter=scatter.value))
+def fit_with(scatter: Scatter, problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
+    """The same hypothesis with another scatter in the likelihood, and the problem with it."""
+    other = replace(problem, budget=replace(problem.budget, scatter=scatter.value))
     start = fit.log_p_m, fit.values
     return other, fit_hypothesis(other, fit.hypothesis, start, nuisances=fit)
 
 
-def allow_scatter(bench: Workbench, fit: Fit) -> tuple[Workbench, Fit, Scatter | None]:
+def allow_scatter(problem: Problem, fit: Fit) -> tuple[Problem, Fit, Scatter | None]:
     """The fit with the least scatter or, where it has more evidence so, with the larger one that it asks for: the third then."""
-    least = weigh_least(bench.terms.scatter)
-    asked = find_larger(least, bench, fit)
+    least = weigh_least(problem.budget.scatter)
+    asked = find_larger(least, problem, fit)
     if asked is not None:
-        wider, loose = fit_with(asked, bench, fit)
+        wider, loose = fit_with(asked, problem, fit)
         if asked.log_prior + loose.evidence > least.log_prior + fit.evidence:
             return wider, loose, asked
-    return bench, fit, None
+    return problem, fit, None
 
 
-def set_terms(campaign: Campaign) -> Terms:
+def set_error_budget(campaign: Campaign) -> ErrorBudget:
     """The error terms, with the scatter of ln p_m that the campaign states, or else the least."""
     stated = campaign.sample.scatter
-    return Terms() if stated is None else replace(Terms(), scatter=stated)
+    return ErrorBudget() if stated is None else replace(ErrorBudget(), scatter=stated)

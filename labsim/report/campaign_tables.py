@@ -19,8 +19,8 @@ from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
 from ..inference.fits.posterior import Posterior
+from ..inference.problem import Problem
 from ..inference.published.calibrate import summarise
-from ..inference.workbench import Workbench
 from ..records import Campaign, FloatArray
 from ..sph import solver_hash
 from .pages.law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
@@ -57,7 +57,7 @@ def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
         "points": found.fit.points,
         "p_value": found.p_value,
         "scatter": found.scatter.summarise(),
-        "error_budget": asdict(found.bench.terms),
+        "error_budget": asdict(found.problem.budget),
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,
         "wall_s": found.wall,
@@ -78,19 +78,19 @@ def say_calibrated(campaign: Campaign, value: float) -> str:
     return f"{value * factor:.3g} {unit}"
 
 
-def is_pushed(bench: Workbench) -> bool:
+def is_pushed(problem: Problem) -> bool:
     """Whether the records are those of pushes."""
-    return any(family.pushed for family in bench.families)
+    return any(group.pushed for group in problem.groups)
 
 
-def say_records(bench: Workbench) -> str:
+def say_records(problem: Problem) -> str:
     """``drops`` or ``pushes``."""
-    return "pushes" if is_pushed(bench) else "drops"
+    return "pushes" if is_pushed(problem) else "drops"
 
 
-def say_count(bench: Workbench) -> str:
+def say_count(problem: Problem) -> str:
     """``1 drop``, ``25 pushes``."""
-    count, records = len(bench.tracks.samples), say_records(bench)
+    count, records = len(problem.tracks.samples), say_records(problem)
     return f"{count} {records if count != 1 else 'push' if records == 'pushes' else 'drop'}"
 
 
@@ -100,8 +100,8 @@ def campaign_calibration_lines(found: Calibration) -> str:
         show_parameter(found.campaign.material.law),
     )
     mean, sd, low, high = (q[key] * factor for key in ("mean", "sd", "q05", "q95"))
-    scans = len(found.bench.scans)
-    others = [each.name for each in found.bench.observations if each.kind not in ("drops", "map")]
+    scans = len(found.problem.scans)
+    others = [each.name for each in found.problem.observations if each.kind not in ("drops", "map")]
     beside = "".join(f", {name}" for name in others)
     lines = [
         *_say_doubts(found),
@@ -111,10 +111,10 @@ def campaign_calibration_lines(found: Calibration) -> str:
         q = summarise(found.posterior.samples(name))
         lines.append(f"  {name} = {q['mean']:.4g} ± {q['sd']:.2g}")
     lines += [
-        f"  {say_count(found.bench)}, {scans} scan{'s' * (scans != 1)}{beside}; χ² {found.fit.chi_square:.0f} for "
+        f"  {say_count(found.problem)}, {scans} scan{'s' * (scans != 1)}{beside}; χ² {found.fit.chi_square:.0f} for "
         f"{found.fit.points} data ({state_p_value(found.p_value)})",
         f"  scatter of ln {label} from sample to sample {found.scatter.mean:.3f} ± {found.scatter.sd:.3f}"
-        f" ({found.bench.terms.scatter:.2g} in use)",
+        f" ({found.problem.budget.scatter:.2g} in use)",
         f"  R-hat {found.posterior.r_hat:.3f}, {found.posterior.ess:.0f} independent samples; "
         f"{found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s",
     ]
@@ -131,10 +131,10 @@ def _quantiles(posterior: Posterior, name: str) -> dict[str, float]:
     return {"q05": float(q05), "q50": float(q50), "q95": float(q95)}
 
 
-def state_numerical_error(bench: Workbench) -> dict[str, float]:
+def state_numerical_error(problem: Problem) -> dict[str, float]:
     """Of the simulated depth, and the spacing (m) of the smallest tip."""
-    radii = [family.projectile.tip_radius for family in bench.families if not family.is_scan]
-    return {"depth_relative": NUMERICAL_DEPTH, "spacing_m": min(radii) / bench.grid.cells}
+    radii = [group.projectile.tip_radius for group in problem.groups if not group.is_scan]
+    return {"depth_relative": NUMERICAL_DEPTH, "spacing_m": min(radii) / problem.grid.cells}
 
 
 def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) -> dict[str, Any]:
@@ -146,7 +146,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         fit = fits.get(hypothesis)
         if fit is not None:
             for k, name in enumerate(hypothesis, start=1):
-                parameter = found.bench.effects[name].amplitudes[0]
+                parameter = found.problem.effects[name].amplitudes[0]
                 value, sigma = parameter.null + fit.values[name], math.sqrt(fit.covariance[k, k])
                 full = f"{name}.{parameter.name}"
                 low, high = parameter.limits
@@ -164,7 +164,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             cause["free_law"] = describe_unknown(found)
         causes.append(cause)
     gain = found.gain
-    unit = "" if is_pushed(found.bench) else "_m"  # of a push what is left is relative
+    unit = "" if is_pushed(found.problem) else "_m"  # of a push what is left is relative
     return {
         "format": 1,
         "campaign": found.campaign.name,
@@ -185,7 +185,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
                 "cause": each.name,
                 "trace_sigma": each.trace,
                 "value": list(each.values),
-                "unit": found.bench.effects[each.name].amplitudes[0].unit,
+                "unit": found.problem.effects[each.name].amplitudes[0].unit,
                 found.posterior_nominal.names[0]: list(each.p_m),
             }
             for each in found.untestable
@@ -224,9 +224,9 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "next_experiment": [
             {"change": each.text, "information_bits": each.information_bits} for each in suggestions
         ],
-        "numerical_error": state_numerical_error(found.bench),
+        "numerical_error": state_numerical_error(found.problem),
         "scatter": found.scatter.summarise(),
-        "error_budget": asdict(found.bench.terms),
+        "error_budget": asdict(found.problem.budget),
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,
         "wall_s": found.wall,
@@ -263,7 +263,7 @@ def say_verdict(found: Diagnosis) -> str:
             f"The nominal simulation explains these data at {label} = {nominal} "
             f"(probability {say_probability(probability)}); nothing in the catalogue is needed."
         )
-    kinds = {found.bench.effects[name].kind for name in best}
+    kinds = {found.problem.effects[name].kind for name in best}
     lead = LEADS.get(next(iter(kinds)), "") if len(kinds) == 1 else ""
     causes = ", and ".join(_say_cause(found, name) for name in best)
     beside = [(h, p) for h, p in found.verdict.named[1:] if set(best) < set(h)]
@@ -290,7 +290,7 @@ def say_verdict(found: Diagnosis) -> str:
         lead = "These data do not decide; most probable"
     return (
         f"{lead or 'The simulation is wrong'}: {causes}; probability {sure}{hardly}. With it, {label} "
-        f"{moved}, and {say_gain(found.gain, say_records(found.bench))}."
+        f"{moved}, and {say_gain(found.gain, say_records(found.problem))}."
     )
 
 
@@ -302,7 +302,7 @@ LISTED_NOWHERE = {
 
 def _say_titles(found: Diagnosis, names: Sequence[str]) -> str:
     titles = [
-        found.bench.effects[name].title if name in found.bench.effects else LISTED_NOWHERE[name]
+        found.problem.effects[name].title if name in found.problem.effects else LISTED_NOWHERE[name]
         for name in names
     ]
     return " and ".join(f"{title[0].lower()}{title[1:]}" for title in titles)
@@ -310,7 +310,7 @@ def _say_titles(found: Diagnosis, names: Sequence[str]) -> str:
 
 def _say_cause(found: Diagnosis, name: str) -> str:
     """``the pixels are larger than stated (factor 1.06, 90 %: 1.05 to 1.07)``."""
-    effect = found.bench.effects[name]
+    effect = found.problem.effects[name]
     if not effect.amplitudes:
         return effect.title[0].lower() + effect.title[1:]
     parameter = effect.amplitudes[0]
@@ -355,10 +355,10 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         low, high = np.quantile(found.p_m_averaged, [0.05, 0.95]) * factor
         lines.append(f"  {label} whichever of these is at work: {low:.2f} to {high:.2f} {unit} (90 %)")
     gain = found.gain
-    shown, of_shown = (100.0, "%") if is_pushed(found.bench) else (1e6, "µm")
+    shown, of_shown = (100.0, "%") if is_pushed(found.problem) else (1e6, "µm")
     nearest = "the nearest listed cause, " if found.verdict.word == "unknown" else ""
     lines.append(
-        f"  held-out {say_records(found.bench)}: rms {gain.rms_nominal * shown:.1f} {of_shown} nominal, "
+        f"  held-out {say_records(found.problem)}: rms {gain.rms_nominal * shown:.1f} {of_shown} nominal, "
         f"{gain.rms_extended * shown:.1f} {of_shown} with "
         f"{nearest}{' + '.join(found.best.hypothesis) or 'nothing added'}, {gain.rms_noise * shown:.1f} {of_shown} expected; "
         f"ln score "
@@ -405,7 +405,7 @@ def extended_model(found: Diagnosis) -> Model:
         )
         return Model(math.exp(learned.fit.log_p_m), law=Law(terms))
     effects = tuple(
-        (name, found.bench.effects[name].at(found.bench.at(name, found.best.values[name])))
+        (name, found.problem.effects[name].at(found.problem.at(name, found.best.values[name])))
         for name in (found.best.hypothesis if found.verdict.word == "effect" else ())
     )
     fit = found.best if found.verdict.word == "effect" else found.nominal

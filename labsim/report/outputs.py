@@ -91,20 +91,20 @@ def say_result(found: Any) -> str | None:
 
 
 def _suggest(found: Diagnosis) -> list[Suggestion]:
-    return suggest(found.bench, [found.nominal, *found.rivals], dict(found.verdict.probabilities))
+    return suggest(found.problem, [found.nominal, *found.rivals], dict(found.verdict.probabilities))
 
 
 def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
     """Every drop measured and simulated, and below it what is left; of pushes all at once and their misfit. Pairs of axes."""
     fits = list_fits(found)
-    if is_pushed(found.bench):
-        pushes = view_pushes(found.bench, fits)
+    if is_pushed(found.problem):
+        pushes = view_pushes(found.problem, fits)
         drawn = plt.figure(figsize=(12.0, 4.6), layout="constrained") if figure is None else figure
         left, right = drawn.subplots(1, 2)
         lay_pushes(pushes, left)
         lay_misfit(pushes, right)
         return [(left, right)]
-    views = view_drops(found.bench, fits)
+    views = view_drops(found.problem, fits)
     drawn = plt.figure(figsize=figures.size_drops(views)) if figure is None else figure
     return figures.lay_drops(views, drawn)
 
@@ -113,14 +113,14 @@ def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> t
     summary = campaign_calibration_summary(found)
     write_json(folder / "calibration.json", summary)
     _write_posterior(found.posterior, folder)
-    if is_pushed(found.bench):
+    if is_pushed(found.problem):
         write_push_calibration(found, folder)
         return summary, campaign_calibration_lines(found)
     figures.draw_posterior(found.posterior, folder / "corner.png")
     views, maps = _draw_fits(found, list_fits(found), folder)
     (folder / "drops.png").rename(folder / "fit.png")
     figures.draw_p_m([("calibrated", found.posterior)], folder / "posterior.png")
-    write_calibration_page(found, summary, state_numerical_error(found.bench), views, maps, folder)
+    write_calibration_page(found, summary, state_numerical_error(found.problem), views, maps, folder)
     return summary, campaign_calibration_lines(found)
 
 
@@ -130,7 +130,7 @@ def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple
     write_json(folder / "diagnosis.json", summary)
     write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
     _write_posterior(found.posterior_extended, folder)
-    if is_pushed(found.bench):
+    if is_pushed(found.problem):
         write_push_diagnosis(found, summary, suggestions, folder)
         return summary, campaign_diagnosis_lines(found, suggestions)
     fits = list_fits(found)
@@ -191,15 +191,15 @@ def _draw_fits(
     found: Calibration | Diagnosis, fits: list[tuple[str, Fit]], folder: Path
 ) -> tuple[list[DropView], list[MapView]]:
     """Pictures of drops and scans with each named fit, and the views that the page shows of them."""
-    views = view_drops(found.bench, fits)
+    views = view_drops(found.problem, fits)
     figures.draw_drops(views, folder / "drops.png")
     figures.draw_misfit(views, folder / "misfit.png")
-    maps = measure_maps(found.campaign, view_maps(found.bench, fits))
+    maps = measure_maps(found.campaign, view_maps(found.problem, fits))
     if maps:
         figures.draw_maps(maps, folder / "maps.png")
     (folder / "tests.png").unlink(missing_ok=True)
-    if find_tests(found.bench, [])[0]:
-        draw_tests(found.bench, fits, folder / "tests.png")
-    if found.bench.undisturbed:
-        figures.draw_undisturbed(found.bench, folder / "undisturbed.png")
+    if find_tests(found.problem, [])[0]:
+        draw_tests(found.problem, fits, folder / "tests.png")
+    if found.problem.undisturbed:
+        figures.draw_undisturbed(found.problem, folder / "undisturbed.png")
     return views, maps

@@ -10,7 +10,7 @@ from labsim.diagnosis.average import average_p_m
 from labsim.diagnosis.campaign import allow_for_codes
 from labsim.diagnosis.judge import Verdict
 from labsim.inference.fits.fitting import Fit
-from labsim.inference.observations.drop_terms import Terms
+from labsim.inference.observations.linearised_drop import ErrorBudget
 
 RANGE = (300.0, 6000.0)
 
@@ -73,15 +73,17 @@ def test_beside_a_cause_of_the_material_p_m_may_be_what_another_code_says():
         "tensile_strength": SimpleNamespace(kind="material"),
         "pixel_scale": SimpleNamespace(kind="measurement"),
     }
-    bench = SimpleNamespace(effects=effects, terms=Terms())
+    problem = SimpleNamespace(effects=effects, budget=ErrorBudget())
     nominal = a_fit((), 900.0, 0.02)
-    wide = allow_for_codes(bench, nominal, a_fit(("tensile_strength",), 1200.0, 0.05))
-    assert wide.between_codes == pytest.approx(math.hypot(Terms().other_codes, 0.4 * math.log(1200 / 900)))
+    wide = allow_for_codes(problem, nominal, a_fit(("tensile_strength",), 1200.0, 0.05))
+    assert wide.between_codes == pytest.approx(
+        math.hypot(ErrorBudget().other_codes, 0.4 * math.log(1200 / 900))
+    )
     draws = average_p_m(Verdict("effect", [(("tensile_strength",), 1.0)]), nominal, [wide], RANGE)
     assert np.std(np.log(draws)) == pytest.approx(math.hypot(0.05, wide.between_codes), rel=0.02)
     assert np.mean(np.log(draws)) == pytest.approx(math.log(1200.0), abs=2e-3)
     scale = a_fit(("pixel_scale",), 1200.0, 0.05)
     assert (
-        allow_for_codes(bench, nominal, scale) is scale
-        and allow_for_codes(bench, nominal, nominal) is nominal
+        allow_for_codes(problem, nominal, scale) is scale
+        and allow_for_codes(problem, nominal, nominal) is nominal
     )

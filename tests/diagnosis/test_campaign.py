@@ -104,7 +104,7 @@ def test_a_cause_that_does_not_predict_held_out_drops_stands_back_behind_unknown
 
 def test_a_cause_that_does_not_fit_its_own_data_is_doubted(monkeypatch):
     """A thousand residuals of 1 and of 1.4 standard deviations, both with held-out drops that are predicted."""
-    monkeypatch.setattr(campaign, "check_prediction", lambda bench, fit, rng: 0.4)
+    monkeypatch.setattr(campaign, "check_prediction", lambda problem, fit, rng: 0.4)
 
     def check(size):
         block = Block(size * np.tile([1.0, -1.0], 500), np.eye(1000), {})

@@ -14,7 +14,7 @@ def a_fit(name: str, evidence: float) -> SimpleNamespace:
 
 
 @pytest.mark.parametrize(
-    ("without_place", "finer"),
+    ("log_evidence_unknown", "finer"),
     [
         (300.0, ["shear_strength", "pore_gas"]),  # a law without a name gains 200, they 150 and 110
         (310.0, ["shear_strength", "pore_gas"]),
@@ -22,10 +22,10 @@ def a_fit(name: str, evidence: float) -> SimpleNamespace:
         (450.0, []),
     ],
 )
-def test_an_effect_far_behind_a_law_without_a_name_is_not_run_finer(monkeypatch, without_place, finer):
+def test_an_effect_far_behind_a_law_without_a_name_is_not_run_finer(monkeypatch, log_evidence_unknown, finer):
     asked = []
 
-    def fit_hypothesis(bench, hypothesis, start, **_):
+    def fit_hypothesis(problem, hypothesis, start, **_):
         asked.append(hypothesis[0])
         return a_fit(hypothesis[0], 260.0)
 
@@ -33,7 +33,7 @@ def test_an_effect_far_behind_a_law_without_a_name_is_not_run_finer(monkeypatch,
     explored = {
         name: a_fit(name, evidence) for name, evidence in (("shear_strength", 250.0), ("pore_gas", 210.0))
     }
-    fits = campaign.confirm_explored(None, a_fit("", 100.0), [], explored, without_place)
+    fits = campaign.confirm_explored(None, a_fit("", 100.0), [], explored, log_evidence_unknown)
     assert asked == finer
     found = {fit.hypothesis[0]: fit.evidence for fit in fits}
     # what is not run finer stays as it was explored: the nearest listed cause has a name
@@ -45,23 +45,23 @@ def test_a_fit_less_likely_than_its_null_is_made_again_from_there(monkeypatch, f
     """A bulk modulus ended at a limit of its amplitude, 8 in ln likelihood below the null that it holds."""
     starts = []
 
-    def fit_hypothesis(bench, hypothesis, start, nuisances=None):
+    def fit_hypothesis(problem, hypothesis, start, nuisances=None):
         starts.append(start[1]["bulk_modulus"])
         likelihood = -80.0 if len(starts) == 1 else from_null
         where = "far" if len(starts) == 1 else "null"
         return SimpleNamespace(log_likelihood=likelihood, evidence=likelihood - 3.0, where=where)
 
     monkeypatch.setattr(campaign, "fit_hypothesis", fit_hypothesis)
-    bench = SimpleNamespace(
+    problem = SimpleNamespace(
         effects={"bulk_modulus": SimpleNamespace(amplitudes=[SimpleNamespace(step=10.0)])}
     )
     nominal = SimpleNamespace(log_p_m=7.0, log_likelihood=-75.0)
     score = SimpleNamespace(name="bulk_modulus", amplitude=99.0)
-    assert campaign._fit_from_score(bench, nominal, score).where == kept
+    assert campaign._fit_from_score(problem, nominal, score).where == kept
     assert starts == [20.0, 0.0]
     starts.clear()
     nominal.log_likelihood = -85.0
-    assert campaign._fit_from_score(bench, nominal, score).where == "far"
+    assert campaign._fit_from_score(problem, nominal, score).where == "far"
     assert starts == [20.0]
 
 
@@ -73,15 +73,15 @@ def test_a_cause_whose_runs_fail_is_said_not_to_be_judged():
     ]
     for table, runs in zip(tables, ({-0.7: np.zeros((1, 2))}, {}), strict=True):
         table.fingerprints["shear_strength"] = {-2: runs}
-    bench = SimpleNamespace(
+    problem = SimpleNamespace(
         effects={
             name: SimpleNamespace(amplitudes=[None])
             for name in ("pore_gas", "shear_strength", "shear_strength@0.5", "pixel_scale")
         },
-        costs_runs=lambda name: name != "pixel_scale",
+        affects_simulation=lambda name: name != "pixel_scale",
         features=[SimpleNamespace(table=table) for table in tables],
     )
-    (said,) = campaign.warn_failed(bench)
+    (said,) = campaign.warn_failed(problem)
     assert said.startswith("shear_strength: is not judged")
     tables[1].fingerprints["shear_strength"][-2] = {0.7: np.zeros((1, 2))}
-    assert campaign.warn_failed(bench) == []
+    assert campaign.warn_failed(problem) == []

@@ -15,7 +15,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import judge_campaign
 from labsim.diagnosis.gain import predict_held_out
 from labsim.diagnosis.unlisted import free_law
-from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate, is_wanted
+from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate, needs_free_law
 from labsim.diagnosis.unlisted.hats import FreeLaw, make_hats
 from labsim.diagnosis.unlisted.learned_law import learn_law
 from labsim.diagnosis.unlisted.unknown import FREEDOMS
@@ -24,7 +24,7 @@ from labsim.effects.law_places import LAW_PLACES, combine
 from labsim.effects.terms import list_terms
 from labsim.inference.fits.blocks import Block, solve_globals
 from labsim.inference.fits.fitting import fit_hypothesis
-from labsim.inference.open_workbench import open_workbench
+from labsim.inference.open_problem import open_problem
 from labsim.runs.store import RunStore
 from labsim.sph import DropSetting
 from labsim.sph.sirono import tabulate_strengths
@@ -143,9 +143,9 @@ def test_runs_of_hats_are_made_only_where_they_can_matter(
 ) -> None:
     rivals = []
     if best is not None:
-        monkeypatch.setattr(free_law, "goodness_of_fit", lambda fit: best[0])
+        monkeypatch.setattr(free_law, "fit_p_value", lambda fit: best[0])
         rivals = [SimpleNamespace(evidence=best[1]), SimpleNamespace(evidence=0.0)]
-    assert is_wanted(p_value, rivals, 20.0, predicted) is wanted
+    assert needs_free_law(p_value, rivals, 20.0, predicted) is wanted
 
 
 # ---------------------------------------------------------------- the hats
@@ -246,8 +246,8 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     truth.prepare([hidden])
     seen = measure_hidden(truth, hidden, np.random.default_rng(3), scans=0)
     effects = {name: effect for name, effect in list_effects().items() if name in LISTED}
-    bench = open_workbench(campaign, store, effects, workers=1, drops=seen.drops)
-    found = judge_campaign(bench, fit_hypothesis(bench, (), (math.log(1300.0), {})))
+    problem = open_problem(campaign, store, effects, workers=1, drops=seen.drops)
+    found = judge_campaign(problem, fit_hypothesis(problem, (), (math.log(1300.0), {})))
     assert found.verdict.word == "unknown" and found.verdict.probabilities[0][1] > 0.5
     unknown = found.unknown
     without_runs = {term.title for term in list_terms().values() if term.acts.see}
@@ -262,10 +262,10 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     # its size is not asserted: the prior shrinks a lone hat, and p_m takes what is common to all depths (docs/free-law.md)
     peak = int(np.argmax(mean))
     assert mean[peak] > 1.5 * sigma[peak]
-    assert not any(name in found.bench.effects for law in LAWS for name in law.hats)
+    assert not any(name in found.problem.effects for law in LAWS for name in law.hats)
     # what is learned in its place: a force of depth with its peak in the film, by which held-out drops are predicted
     assert unknown.tangents is not None
-    learned = learn_law(bench, found.nominal, unknown.tangents, predict_held_out(bench, found.nominal))
+    learned = learn_law(problem, found.nominal, unknown.tangents, predict_held_out(problem, found.nominal))
     assert learned is not None
     best = learned.best
     assert {term.place for term in best.terms} == {"force of depth"}
@@ -273,4 +273,4 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     assert BEGIN < place[np.argmax(drawn)] < END
     assert best.fit.evidence > found.nominal.evidence + 10.0
     assert best.gain.log_score_difference > 0.0  # of held-out drops, of which six by one rod show little
-    assert not any(term.name in bench.effects for term in best.terms)
+    assert not any(term.name in problem.effects for term in best.terms)

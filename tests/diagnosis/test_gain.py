@@ -41,11 +41,11 @@ def make_fit(seed: int, *, hidden: float = 0.0):
         for name in NAMES
     ]
     fit = SimpleNamespace(drops=drops, blocks=(drops,), hypothesis=(EFFECT,), values={EFFECT: 0.0})
-    bench = SimpleNamespace(
+    problem = SimpleNamespace(
         effects={EFFECT: SimpleNamespace(amplitudes=[SimpleNamespace(scale=SCALE)])},
         tracks=SimpleNamespace(models=models, samples={name: [name] for name in NAMES}),
     )
-    return bench, fit
+    return problem, fit
 
 
 def condition(linear: Block, held: np.ndarray, widths: dict[str, float]):
@@ -59,8 +59,8 @@ def condition(linear: Block, held: np.ndarray, widths: dict[str, float]):
 
 @pytest.mark.parametrize("known", [False, True])
 def test_a_held_out_drop_is_predicted_as_a_normal_distribution_says(known):
-    bench, fit = make_fit(3)
-    found = predict_held_out(bench, fit, known=known)
+    problem, fit = make_fit(3)
+    found = predict_held_out(problem, fit, known=known)
     widths = {} if known else {"ln_p_m": WIDE, EFFECT: SCALE}
     for k in range(DROPS):
         held = np.zeros(POINTS * DROPS, dtype=bool)
@@ -76,9 +76,9 @@ def test_a_held_out_drop_is_predicted_as_a_normal_distribution_says(known):
 
 
 def test_two_records_of_a_drop_are_held_out_together():
-    bench, fit = make_fit(3)
-    bench.tracks.samples = {NAMES[0]: NAMES[:2], NAMES[2]: NAMES[2:]}
-    found = predict_held_out(bench, fit)
+    problem, fit = make_fit(3)
+    problem.tracks.samples = {NAMES[0]: NAMES[:2], NAMES[2]: NAMES[2:]}
+    found = predict_held_out(problem, fit)
     assert found.names == (NAMES[0], NAMES[2])
     held = np.zeros(POINTS * DROPS, dtype=bool)
     for k in (0, 1):
@@ -92,9 +92,9 @@ def test_drops_miss_by_what_is_expected_of_a_true_model_and_by_more_of_a_wrong_o
     right, wrong = [], []
     for seed in range(60):
         for hidden, ratios in ((0.0, right), (4.0, wrong)):
-            bench, fit = make_fit(seed, hidden=hidden)
+            problem, fit = make_fit(seed, hidden=hidden)
             fit.hypothesis = ()
-            found = predict_held_out(bench, fit)
+            found = predict_held_out(problem, fit)
             ratios.append(np.mean(found.rms**2) / np.mean(found.expected**2))
     assert np.mean(right) == pytest.approx(1.0, abs=3 * np.std(right) / math.sqrt(len(right)))
     assert np.std(right) / math.sqrt(len(right)) < 0.1
@@ -105,9 +105,9 @@ def test_the_check_of_a_prediction_is_uniform_for_a_true_model_and_small_for_a_w
     true, wrong = [], []
     for seed in range(100):
         for hidden, found in ((0.0, true), (5.0, wrong)):
-            bench, fit = make_fit(seed, hidden=hidden)
+            problem, fit = make_fit(seed, hidden=hidden)
             fit.hypothesis = ()
-            found.append(check_prediction(bench, fit, np.random.default_rng(seed), draws=400))
+            found.append(check_prediction(problem, fit, np.random.default_rng(seed), draws=400))
     assert kstest(true, "uniform").pvalue > 0.01
     assert np.mean(np.array(true) < 0.05) <= 0.12  # 5 % and three standard deviations of a hundred
     assert np.mean(np.array(wrong) < 0.05) > 0.9
@@ -119,19 +119,19 @@ def test_what_a_prior_and_a_scan_say_of_the_globals_is_drawn_as_well():
     for seed in range(100):
         random = np.random.default_rng(1000 + seed)
         amplitude = random.normal(0, SCALE)
-        bench, fit = make_fit(seed, hidden=amplitude)
+        problem, fit = make_fit(seed, hidden=amplitude)
         tangents = {"ln_p_m": np.zeros(8), EFFECT: np.full(8, 3.0)}
         block = Block(tangents[EFFECT] * amplitude + random.normal(size=8), np.eye(8), tangents)
         fit.blocks = (fit.drops, block)
-        found.append(check_prediction(bench, fit, random, draws=400))
+        found.append(check_prediction(problem, fit, random, draws=400))
     assert kstest(found, "uniform").pvalue > 0.01
 
 
 def test_a_single_drop_leaves_nothing_to_check():
-    bench, fit = make_fit(1)
-    bench.tracks.models = bench.tracks.models[:1]
-    bench.tracks.samples = {NAMES[0]: NAMES[:1]}
-    assert check_prediction(bench, fit, np.random.default_rng(1)) == 1.0
+    problem, fit = make_fit(1)
+    problem.tracks.models = problem.tracks.models[:1]
+    problem.tracks.samples = {NAMES[0]: NAMES[:1]}
+    assert check_prediction(problem, fit, np.random.default_rng(1)) == 1.0
 
 
 def test_the_gain_is_the_share_of_the_mean_square_above_the_noise():

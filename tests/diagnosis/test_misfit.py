@@ -10,8 +10,8 @@ from labsim.inference.calibrate import prepare
 
 def look(tmp_path, **changes):
     campaign = read_campaign(laws.write_campaign(tmp_path / "made", scan=True, **changes))
-    bench, fit = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1)
-    return measure_misfit(bench, fit)
+    problem, fit = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1)
+    return measure_misfit(problem, fit)
 
 
 def test_nothing_is_missed_where_nothing_is_wrong(tmp_path):

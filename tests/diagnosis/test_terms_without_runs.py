@@ -19,7 +19,7 @@ from labsim.effects import list_effects
 from labsim.effects.terms import list_terms
 from labsim.errors import ExtrapolationError
 from labsim.inference.fits.fitting import fit_hypothesis
-from labsim.inference.open_workbench import open_workbench
+from labsim.inference.open_problem import open_problem
 from labsim.runs.store import RunStore
 
 CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")
@@ -66,27 +66,27 @@ def test_a_hidden_one_is_unknown_and_has_its_size(term, size, words, shared_stor
         name: effect for name, effect in list_effects().items() if name in ("contact_friction", "surface_row")
     }
 
-    def open_with(terms):
-        bench = open_workbench(campaign, store, effects, terms=terms, workers=1, drops=seen.drops)
-        return bench, fit_hypothesis(bench, (), (math.log(1300.0), {}))
+    def open_with(budget):
+        problem = open_problem(campaign, store, effects, budget=budget, workers=1, drops=seen.drops)
+        return problem, fit_hypothesis(problem, (), (math.log(1300.0), {}))
 
     found = judge_scatters(campaign, open_with)
     assert found.verdict.word == "unknown" and found.verdict.probabilities[0][1] > 0.9
     assert found.unknown.block == list_terms()[term].title
-    fit = fit_without_runs(found.bench, found.nominal)[term]
+    fit = fit_without_runs(found.problem, found.nominal)[term]
     assert abs(fit.values[term] - size) < 3 * math.sqrt(fit.covariance[1, 1]) < 0.3 * size
-    assert term not in found.bench.effects
+    assert term not in found.problem.effects
 
 
 def test_a_term_whose_fit_leaves_the_runs_is_left_out(monkeypatch):
     """The others are compared all the same."""
 
-    def fit(bench, names, start, **how):
+    def fit(problem, names, start, **how):
         if names == ("clock_drift",):
             raise ExtrapolationError("simulation", "runs", "extrapolate")
         return names
 
     terms = {name: list_terms()[name] for name in ("clock_drift", "rolling_shutter")}
-    monkeypatch.setattr(hats, "add_terms", lambda bench: (bench, terms, {}))
+    monkeypatch.setattr(hats, "add_terms", lambda problem: (problem, terms, {}))
     monkeypatch.setattr(hats, "fit_hypothesis", fit)
     assert list(fit_without_runs(None, SimpleNamespace(log_p_m=7.0))) == ["rolling_shutter"]

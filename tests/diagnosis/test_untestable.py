@@ -14,21 +14,21 @@ from labsim.diagnosis.untestable import find_combination, list_untestable
 from labsim.effects.priors import Normal
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
-from labsim.inference.workbench import Workbench
+from labsim.inference.problem import Problem
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory) -> tuple[Workbench, Fit]:
+def opened(tmp_path_factory) -> tuple[Problem, Fit]:
     campaign = read_campaign(write_campaign(tmp_path_factory.mktemp("untestable") / "made"))
-    bench, fit = prepare(campaign, LawStore(tmp_path_factory.mktemp("store")), workers=1)
-    screen(bench, fit, np.random.default_rng(1))  # asks for the runs of every effect
-    return bench, fit
+    problem, fit = prepare(campaign, LawStore(tmp_path_factory.mktemp("store")), workers=1)
+    screen(problem, fit, np.random.default_rng(1))  # asks for the runs of every effect
+    return problem, fit
 
 
 def test_what_takes_the_place_of_p_m_is_said_to(opened):
     """Strength goes as p_m f^0.3 φ^4 here, depth as √(mass / strength): no drop tells f, φ or mass from p_m."""
-    bench, fit = opened
-    found = {each.name: each for each in list_untestable(bench, fit)}
+    problem, fit = opened
+    found = {each.name: each for each in list_untestable(problem, fit)}
     assert set(found) == {"shear_strength", "filling_factor", "projectile_mass", "strength_rate"}
     shear = found["shear_strength"]
     step = 0.05 * math.log(0.75)  # a twentieth of the screening's, whose runs are made at f = 0.75
@@ -38,29 +38,29 @@ def test_what_takes_the_place_of_p_m_is_said_to(opened):
     rate = found.pop("strength_rate")  # drops tell it from p_m, but less well than p_m alone is measured
     assert rate.trace == pytest.approx(2.0)
     assert all(each.trace < 1.0 for each in found.values())  # of 1 % by which a secant is no tangent
-    scale = bench.effects["shear_strength"].amplitudes[0].scale
+    scale = problem.effects["shear_strength"].amplitudes[0].scale
     assert shear.values == pytest.approx((1 - scale, 1 + scale))  # its prior ends before it could be seen
     assert shear.width == pytest.approx(2 * shear.traded * scale, rel=1e-6)
     assert shear.p_m[0] < math.exp(fit.log_p_m) < shear.p_m[1]
 
 
 def test_what_is_measured_all_the_same(opened):
-    bench, fit = opened
-    untestable = list_untestable(bench, fit)
+    problem, fit = opened
+    untestable = list_untestable(problem, fit)
     first = next(each for each in untestable if each.name == "shear_strength")
-    held = find_combination(bench, fit, [first])
+    held = find_combination(problem, fit, [first])
     assert held is not None
     assert held.expression == f"p_m * shear_strength.factor^{first.traded:.2f}"
     assert held.value == pytest.approx(math.exp(fit.log_p_m))
-    assert find_combination(bench, fit, []) is None
+    assert find_combination(problem, fit, []) is None
 
 
 def test_what_would_be_seen_at_its_prior_is_taken_as_far_as_it_is_not(opened):
     """With a prior a hundred times as wide every listed cause leaves two standard deviations, and no more."""
-    bench, fit = opened
-    before = {each.name: each for each in list_untestable(bench, fit)}
-    wide = replace(bench, effects=dict(bench.effects))
-    effect = bench.effects["filling_factor"]
+    problem, fit = opened
+    before = {each.name: each for each in list_untestable(problem, fit)}
+    wide = replace(problem, effects=dict(problem.effects))
+    effect = problem.effects["filling_factor"]
     broad = replace(
         effect.parameters[0], prior=Normal(effect.parameters[0].null, 100 * effect.parameters[0].scale)
     )
@@ -74,20 +74,20 @@ def test_what_would_be_seen_at_its_prior_is_taken_as_far_as_it_is_not(opened):
 def test_about_a_cause_that_is_fitted_it_follows_too(opened):
     """The fitted cause itself is not listed; p_m and its amplitude together leave of the others no more than p_m alone. What
     moves p_m inside its interval, which is wider now, is not listed either."""
-    bench, fit = opened
-    rate = fit_hypothesis(bench, ("strength_rate",), (fit.log_p_m, {"strength_rate": 0.0}), nuisances=fit)
-    found = {each.name: each for each in list_untestable(bench, rate)}
+    problem, fit = opened
+    rate = fit_hypothesis(problem, ("strength_rate",), (fit.log_p_m, {"strength_rate": 0.0}), nuisances=fit)
+    found = {each.name: each for each in list_untestable(problem, rate)}
     assert "strength_rate" not in found
-    before = {each.name: each for each in list_untestable(bench, fit)}
+    before = {each.name: each for each in list_untestable(problem, fit)}
     assert set(found) == {"shear_strength", "filling_factor"} < set(before)
     assert found["shear_strength"].trace < 1.1 * before["shear_strength"].trace
 
 
 def test_a_variant_of_a_shape_is_no_cause_of_its_own(tmp_path):
     campaign = read_campaign(write_campaign(tmp_path / "made"))
-    bench, fit = prepare(campaign, LawStore(tmp_path / "store"), workers=1)
-    lay_out_shapes(bench)
-    screen(bench, fit, np.random.default_rng(1))
-    assert any(name.startswith("strength_rate@") for name in bench.effects)
-    names = [each.name for each in list_untestable(bench, fit)]
+    problem, fit = prepare(campaign, LawStore(tmp_path / "store"), workers=1)
+    lay_out_shapes(problem)
+    screen(problem, fit, np.random.default_rng(1))
+    assert any(name.startswith("strength_rate@") for name in problem.effects)
+    names = [each.name for each in list_untestable(problem, fit)]
     assert "strength_rate" in names and not any("@" in name for name in names)

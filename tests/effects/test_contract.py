@@ -19,8 +19,8 @@ from labsim.effects import (
     Uniform,
     deepest_dust,
     list_effects,
+    list_impacts,
     list_places,
-    list_thrown,
     load_effect,
     load_file,
     loading,
@@ -132,7 +132,11 @@ def test_a_users_own_file_joins_the_catalogue(tmp_path: Path) -> None:
     assert set(effects) - set(list_effects()) == {"added_mass"}
     assert "added_mass" in list_effects(folder)
     mine = effects["added_mass"]
-    assert mine.applies(campaign) == "" and mine.costs_runs and mine.description.startswith("Dust is carried")
+    assert (
+        mine.applies(campaign) == ""
+        and mine.affects_simulation
+        and mine.description.startswith("Dust is carried")
+    )
     place = list_places(campaign)["S01"]
     drop = campaign.drops[0]
     setting = DropSetting(projectile=drop.projectile, impact_speed=0.65, material=campaign.material)
@@ -249,7 +253,7 @@ def test_the_deepest_dust_is_that_of_the_softest_run() -> None:
     thrown = [*campaign.drops, *campaign.scans]
     depths = [
         set_nominal_drop(campaign, each.projectile, speed, p_m, 5.0).extent[1]
-        for each, (_, _, speed) in zip(thrown, list_thrown(campaign), strict=True)
+        for each, (_, _, speed) in zip(thrown, list_impacts(campaign), strict=True)
         for p_m in np.geomspace(lowest, highest, 7)
     ]
     spacing = 1.5e-3 / 5.0  # of the largest tip: depths are whole numbers of it

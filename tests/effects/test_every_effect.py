@@ -30,7 +30,7 @@ CAMPAIGN = dataclasses.replace(
 )
 EFFECTS = list_effects(CAMPAIGN)
 PUSHES = {"partial_drainage", "gauge_warming"}  # of pushes alone: tests/inference/test_pushes.py
-PHYSICS = [name for name, effect in EFFECTS.items() if effect.costs_runs and name not in PUSHES]
+PHYSICS = [name for name, effect in EFFECTS.items() if effect.affects_simulation and name not in PUSHES]
 RADIUS, SPACING, PIXEL = 5.0e-4, 1.25e-4, 2.0e-5
 NAMES = {
     "strength_rate": {"eta", "n"},

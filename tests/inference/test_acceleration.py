@@ -24,7 +24,7 @@ from labsim.inference.emulation.curves import decode_speed, encode_speeds
 from labsim.inference.fits import steps
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations.acceleration_model import AccelerationModel
-from labsim.inference.scatter import estimate_scatter, set_terms
+from labsim.inference.scatter import estimate_scatter, set_error_budget
 from labsim.records import STANDARD_GRAVITY, Material, Projectile
 from labsim.report.outputs import write_result
 from labsim.sph import DropSetting, simulate
@@ -59,7 +59,7 @@ def test_an_accelerometer_stands_beside_cameras(tmp_path: Path) -> None:
     for name in ("D01", "D03", "D05"):
         shutil.copy(sound_felt / "drops" / name / "acceleration.csv", seen / "drops" / name)
     sound, (low, high) = fit(seen, tmp_path)
-    kinds = [isinstance(model, AccelerationModel) for model in sound.bench.tracks.models]
+    kinds = [isinstance(model, AccelerationModel) for model in sound.problem.tracks.models]
     assert kinds == [True, False] * 3
     assert low < 1300.0 < high and sound.p_value > 0.05
     assert spoilt.fit.chi_square > sound.fit.chi_square + 7.0**2
@@ -71,7 +71,7 @@ def test_five_samples_in_the_dust_are_enough(seed: int, tmp_path: Path) -> None:
     drops = [(1.0, 12.0, 0.35), (1.0, 12.0, 0.7), (1.0, 12.0, 0.5)]
     folder = accelerations.write_campaign(tmp_path / "c", rate=2.2e3, noise=0.002, seed=seed, drops=drops)
     found, (low, high) = fit(folder, tmp_path)
-    models = found.bench.tracks.models
+    models = found.problem.tracks.models
     assert len(models) == len(drops) and max(np.sum(m.below) for m in models) < 8
     assert low < 1300.0 < high and found.p_value > 0.05
 
@@ -99,12 +99,12 @@ def test_two_records_of_a_drop_have_its_dust_in_common(tmp_path: Path) -> None:
     widths = []
     for joined in (True, False):
         campaign = read_campaign(write_both(tmp_path / f"{joined}", joined=joined))
-        terms = set_terms(campaign)
-        bench, found = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1, terms=terms)
+        budget = set_error_budget(campaign)
+        problem, found = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1, budget=budget)
         widths.append(math.sqrt(found.covariance[0, 0]))
-        held = predict_held_out(bench, found)
+        held = predict_held_out(problem, found)
         assert len(held.names) == (6 if joined else 12)
-        assert estimate_scatter(bench, found).sd > 0.0
+        assert estimate_scatter(problem, found).sd > 0.0
     # as 1 over the root of the number of drops, beside what is common to all
     assert widths[0] > 1.3 * widths[1]
 
@@ -112,8 +112,8 @@ def test_two_records_of_a_drop_have_its_dust_in_common(tmp_path: Path) -> None:
 def test_errors_of_an_acceleration_integrate_to_depths(tmp_path: Path) -> None:
     """A constant error of 1 m/s² makes -t²/2 of depth at the end of each stretch, counted from contact."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, _ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    model = bench.tracks.models[0]
+    problem, _ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = problem.tracks.models[0]
     assert isinstance(model, AccelerationModel)
     begin = model.observed.begin[model.below][0]
     depth = model.lengths @ np.ones(model.data.size)
@@ -140,8 +140,8 @@ def test_diagnosis_draws_and_states_held_out_records(tmp_path: Path) -> None:
 def test_contact_stays_where_the_record_shows_it(tmp_path: Path) -> None:
     """A model far from the data asks for any contact; the fit must end, and near the blow."""
     folder = accelerations.write_campaign(tmp_path / "c", p_m=2600.0)
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    model = bench.tracks.models[0]
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = problem.tracks.models[0]
     assert isinstance(model, AccelerationModel)
     start = model.start
     for ask in (-1e3, 1e3):
@@ -154,13 +154,13 @@ def test_contact_stays_where_the_record_shows_it(tmp_path: Path) -> None:
 def test_the_likelihood_has_no_jump_as_contact_moves(tmp_path: Path) -> None:
     """Over three stretches, in steps of a hundredth: χ² and ln det C of a drop, with the errors that begin at contact."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
     (own,) = (nuisances for nuisances in fit_.nuisances if nuisances.shape == (1, 3))
-    stretch = float(np.median(np.diff(bench.tracks.models[0].observed.end)))
+    stretch = float(np.median(np.diff(problem.tracks.models[0].observed.end)))
     seen = []
     for shift in np.arange(-150, 151) * 0.01 * stretch:
         moved = own + np.array([[shift, 0.0, 0.0]])
-        (block,) = linearise_at(bench, (moved,), fit_.log_p_m, {})
+        (block,) = linearise_at(problem, (moved,), fit_.log_p_m, {})
         seen.append(block.chi_square + block.log_determinant)
     assert np.abs(np.diff(seen)).max() < 0.5
 
@@ -168,8 +168,8 @@ def test_the_likelihood_has_no_jump_as_contact_moves(tmp_path: Path) -> None:
 def test_runs_between_nodes_give_no_blow_at_contact(tmp_path: Path) -> None:
     """An interpolated speed at contact is off by a thousandth; within a stretch that would be a hundredth of the peak."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    model = bench.tracks.models[0]
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = problem.tracks.models[0]
     code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
     off = np.concatenate([code[:2], 1.001 * code[2:]])
     seen, beside = (model.predict(each, Instrument(), model.start) for each in (code, off))
@@ -179,8 +179,8 @@ def test_runs_between_nodes_give_no_blow_at_contact(tmp_path: Path) -> None:
 def test_errors_of_a_record_do_not_pass_for_its_scale(tmp_path: Path) -> None:
     """A scale that acted on the data would take a hundredth of their χ² for itself, always upwards, and p_m down with it."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    model = bench.tracks.models[0]
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = problem.tracks.models[0]
     assert isinstance(model, AccelerationModel)
     code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
     here = model.predict(code, Instrument(), model.start)
@@ -194,16 +194,16 @@ def test_errors_of_a_record_do_not_pass_for_its_scale(tmp_path: Path) -> None:
 def test_what_a_setting_of_the_solver_changes_is_an_error_and_no_cause(tmp_path: Path) -> None:
     """No dust has the solver's viscosity. Another code's force differed along what it changes, and it passed for a cause."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
     settings = {"artificial_viscosity", "resolution"}
-    assert set(bench.numerics) == settings <= set(bench.reasons) and not settings & set(bench.effects)
-    model = bench.tracks.models[0]
+    assert set(problem.numerics) == settings <= set(problem.reasons) and not settings & set(problem.effects)
+    model = problem.tracks.models[0]
     assert isinstance(model, AccelerationModel)
     amplitude, sigma = model.numerics["artificial_viscosity"]
-    assert sigma == bench.numerics["artificial_viscosity"].amplitudes[0].prior.sd
+    assert sigma == problem.numerics["artificial_viscosity"].amplitudes[0].prior.sd
     for changes in model.table.fingerprints["artificial_viscosity"].values():  # what half of it would do
         changes[amplitude] = np.full_like(next(iter(changes.values())), 0.01)
-    block = steps.solve_at(bench, steps.Place(fit_.log_p_m, {}, fit_.nuisances)).blocks[0]
+    block = steps.solve_at(problem, steps.ParameterPoint(fit_.log_p_m, {}, fit_.nuisances)).blocks[0]
     code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
     instant = model.start._replace(
         **dict(zip(("contact_time", "log_speed"), fit_.nuisances[0][0], strict=False))
@@ -219,36 +219,36 @@ def test_a_law_without_a_name_is_a_share_of_what_is_expected_not_of_what_is_reco
     """A share of the record, with p_m in balance, takes that share of its noise away: of a noisy campaign with nothing hidden
     unknown had 0.99."""
     noisy = accelerations.write_campaign(tmp_path / "c", noise=0.05)
-    bench, fit_ = prepare(read_campaign(noisy), laws.LawStore(tmp_path / "store"), workers=1)
-    reached = law_coordinates(bench, fit_)["reached"]
-    for model, instant in zip(bench.tracks.models, bench.tracks.instants(fit_.nuisances[0]), strict=True):
+    problem, fit_ = prepare(read_campaign(noisy), laws.LawStore(tmp_path / "store"), workers=1)
+    reached = law_coordinates(problem, fit_)["reached"]
+    for model, instant in zip(problem.tracks.models, problem.tracks.instants(fit_.nuisances[0]), strict=True):
         assert isinstance(model, AccelerationModel)
         code = model.table.code(fit_.log_p_m, instant.log_speed, {})
         here = np.where(model.below, np.maximum(model.predict(code, Instrument(), instant), 0.0), 0.0)
         start = fit_.drops.sections[model.observed.name].start
         assert reached[start : start + here.size] == pytest.approx(here, abs=1e-6 * here.max())
-    assert fit_unknown(bench, fit_).evidence < fit_.evidence
+    assert fit_unknown(problem, fit_).evidence < fit_.evidence
 
 
 @pytest.mark.parametrize("off", [-1.2, -0.5, 0.5, 1.2])
 def test_a_contact_that_is_off_finds_back(off: float, tmp_path: Path) -> None:
     """Stretches too early or too late: the force of a round tip begins at nought, so a slope leads to the same χ² as before."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    stretch = float(np.median(np.diff(bench.tracks.models[0].observed.end)))
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    stretch = float(np.median(np.diff(problem.tracks.models[0].observed.end)))
     moved = tuple(
         own + np.array([[off * stretch, 0.0, 0.0]]) if own.shape == (1, 3) else own for own in fit_.nuisances
     )
-    place = steps.Place(fit_.log_p_m, {}, moved)
-    found = steps.settle_nuisances(bench, steps.solve_at(bench, place), 8)
+    place = steps.ParameterPoint(fit_.log_p_m, {}, moved)
+    found = steps.converge_nuisances(problem, steps.solve_at(problem, place), 8)
     assert found.chi_square == pytest.approx(fit_.chi_square, abs=0.05)
 
 
 def test_a_blunt_tip_is_told_that_contact_is_late_by_the_stretch_before_it(tmp_path: Path) -> None:
     """The force would reach into that stretch if contact were earlier: a slope of nought there would leave it late for ever."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
-    bench, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    model = replace(bench.tracks.models[0], blunt=True)
+    problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
+    model = replace(problem.tracks.models[0], blunt=True)
     assert isinstance(model, AccelerationModel)
     before = int(np.argmax(model.observed.end > model.observed.contact_time)) + 1
     width = float(np.median(model.observed.end - model.observed.begin))
@@ -293,13 +293,15 @@ def test_nuisances_that_go_to_and_fro_settle(overshoot: float, monkeypatch: pyte
     """A step that ends ``overshoot`` times as far off as it began, on the other side, ends at the best after all."""
 
     def follow(
-        bench: object, here: SimpleNamespace, log_p_m: float, values: dict
-    ) -> tuple[steps.Place, float]:
+        problem: object, here: SimpleNamespace, log_p_m: float, values: dict
+    ) -> tuple[steps.ParameterPoint, float]:
         (off,) = here.place.nuisances
-        return steps.Place(log_p_m, values, (overshoot * off,)), float(abs(off[0]))
+        return steps.ParameterPoint(log_p_m, values, (overshoot * off,)), float(abs(off[0]))
 
     monkeypatch.setattr(steps, "_follow", follow)
-    monkeypatch.setattr(steps, "solve_at", lambda bench, place: SimpleNamespace(place=place, height=0.0))
-    begin = SimpleNamespace(place=steps.Place(0.0, {}, (np.array([1.0]),)), height=0.0)
-    end = steps.settle_nuisances(None, begin, 12)  # type: ignore[arg-type]
+    monkeypatch.setattr(
+        steps, "solve_at", lambda problem, place: SimpleNamespace(place=place, log_posterior=0.0)
+    )
+    begin = SimpleNamespace(place=steps.ParameterPoint(0.0, {}, (np.array([1.0]),)), log_posterior=0.0)
+    end = steps.converge_nuisances(None, begin, 12)  # type: ignore[arg-type]
     assert abs(end.place.nuisances[0][0]) < 0.1

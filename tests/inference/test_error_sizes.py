@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from labsim.effects import Normal, Parameter
 from labsim.inference.fits import error_sizes
 from labsim.inference.fits.blocks import Block
-from labsim.inference.observations.drop_terms import Terms
+from labsim.inference.observations.linearised_drop import ErrorBudget
 
 MIDDLE, NOISE, POINTS = math.log(1200.0), 0.01, 40
 PARAMETER = Parameter("amount", "1", 0.0, (-10.0, 10.0), Normal(0.0, 2.0), 1.0, "of a test")
@@ -19,7 +19,7 @@ PARAMETER = Parameter("amount", "1", 0.0, (-10.0, 10.0), Normal(0.0, 2.0), 1.0, 
 
 @dataclass
 class Bench:
-    terms: Terms
+    budget: ErrorBudget
 
 
 def residual(log_p_m, amplitude):
@@ -28,15 +28,15 @@ def residual(log_p_m, amplitude):
     return 0.02 * np.cos(9 * x) - 0.3 * (log_p_m - MIDDLE + amplitude - 0.5) - 0.05 * (amplitude - 0.5) * x
 
 
-def covariance(terms, amplitude):
+def covariance(budget, amplitude):
     x = np.linspace(-1, 1, POINTS)
     alike = np.exp(-0.5 * (np.subtract.outer(x, x) / 0.3) ** 2)
-    return NOISE**2 * np.eye(POINTS) + (terms.numerical_change * amplitude) ** 2 * alike
+    return NOISE**2 * np.eye(POINTS) + (budget.numerical_change * amplitude) ** 2 * alike
 
 
 def misfit(theta):
     """The covariance held at an amplitude of 0.5, as about a fit."""
-    lower = np.linalg.cholesky(covariance(Terms(), 0.5))
+    lower = np.linalg.cholesky(covariance(ErrorBudget(), 0.5))
     return np.array([0.5 * np.sum(np.linalg.solve(lower, residual(*point)) ** 2) for point in theta])
 
 
@@ -46,7 +46,9 @@ def surrogate(theta):
 
 def by_quadrature(log_p_m, amplitude):
     def density(size):
-        c = covariance(Terms(numerical_change=Terms().numerical_change * math.exp(size)), amplitude)
+        c = covariance(
+            ErrorBudget(numerical_change=ErrorBudget().numerical_change * math.exp(size)), amplitude
+        )
         r = residual(log_p_m, amplitude)
         value = -0.5 * (r @ np.linalg.solve(c, r) + np.linalg.slogdet(c)[1])
         return math.exp(value - 150.0 - 0.5 * (size / math.log(2.0)) ** 2)
@@ -55,9 +57,9 @@ def by_quadrature(log_p_m, amplitude):
 
 
 def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
-    def linearise(bench, nuisances, log_p_m, values, further=()):
+    def linearise(problem, nuisances, log_p_m, values, further=()):
         amplitude = values["effect"]
-        return (Block(residual(log_p_m, amplitude), covariance(bench.terms, amplitude), {}),)
+        return (Block(residual(log_p_m, amplitude), covariance(problem.budget, amplitude), {}),)
 
     monkeypatch.setattr(error_sizes, "linearise_at", linearise)
     fit = SimpleNamespace(
@@ -69,7 +71,7 @@ def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
     )
     bounds = np.array([np.log([300.0, 6000.0]), PARAMETER.limits])
     target = SimpleNamespace(log_probability=surrogate, misfit=misfit, bounds=bounds)
-    gained = error_sizes.integrate_sizes(Bench(Terms()), fit, target)
+    gained = error_sizes.integrate_sizes(Bench(ErrorBudget()), fit, target)
     assert float(gained(np.array([MIDDLE]))[0]) == pytest.approx(0.0, abs=1e-9)
     near = np.linspace(0.1, 0.9, 8001)
 

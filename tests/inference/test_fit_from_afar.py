@@ -22,9 +22,9 @@ def test_the_best_place_of_the_range_is_begun_from(monkeypatch):
     """The data hardly speak but near 340 Pa, where the others' slopes do not point; the softest dust cannot be simulated."""
     begun = []
 
-    def fit(bench, hypothesis, start, *, nuisances=None, iterations=40):
+    def fit(problem, hypothesis, start, *, nuisances=None, iterations=40):
         log_p_m, values = start
-        assert (bench, hypothesis, values) == (BENCH, (), {})
+        assert (problem, hypothesis, values) == (BENCH, (), {})
         if log_p_m < math.log(301.0):
             raise ExtrapolationError("simulation", "runs", "fail")
         off = abs(log_p_m - math.log(340.0))

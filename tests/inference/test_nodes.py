@@ -17,7 +17,7 @@ from labsim.inference.emulation.grid import (
     strength_node,
 )
 from labsim.inference.emulation.nodes import amplitude_nodes, nodes_around
-from labsim.inference.workbench import Workbench
+from labsim.inference.problem import Problem
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 7])
@@ -130,8 +130,8 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
     tables = [ResponseTable(np.log([0.3, 0.4]), (0, 1)) for _ in range(2)]
     asked = []
 
-    def require_changes(wanted, text, *, few):
-        assert few
+    def require_changes(wanted, text, *, sparse):
+        assert sparse
         for name, amplitude, index in wanted:
             asked.append((name, np.sign(amplitude)))
             for k, table in enumerate(tables):
@@ -139,16 +139,18 @@ def test_where_runs_of_one_side_fail_a_fingerprint_lies_on_the_other():
                 if name == "tensile_strength" or amplitude > 0.0 or k == 0:
                     entry[amplitude] = np.zeros((2, 3))
 
-    bench = SimpleNamespace(
+    problem = SimpleNamespace(
         effects=list_effects(None),
         features=[SimpleNamespace(table=table) for table in tables],
         require_base_about=lambda log_p_m: None,
         require_changes=require_changes,
     )
-    bench._has_fingerprint = MethodType(Workbench._has_fingerprint, bench)
-    bench._find = lambda name: bench.effects[name]
-    Workbench.require_fingerprints(bench, ["shear_strength", "tensile_strength"], math.log(340.0), "causes")
-    steps = {n: np.sign(bench.effects[n].amplitudes[0].step) for n in ("shear_strength", "tensile_strength")}
+    problem._has_fingerprint = MethodType(Problem._has_fingerprint, problem)
+    problem._find = lambda name: problem.effects[name]
+    Problem.require_fingerprints(problem, ["shear_strength", "tensile_strength"], math.log(340.0), "causes")
+    steps = {
+        n: np.sign(problem.effects[n].amplitudes[0].step) for n in ("shear_strength", "tensile_strength")
+    }
     assert steps["shear_strength"] < 0.0
     assert asked == [*steps.items(), ("shear_strength", 1.0)]
     assert all(any(table.fingerprints["shear_strength"].values()) for table in tables)

@@ -118,14 +118,14 @@ def test_six_real_soundings_in_clay_grow_with_speed(pushes: list[ObservedPush], 
     """All at the slowest and the fastest speed; the regression of all 25 says 14 ± 1 % of the net resistance a decade."""
     chosen = [push for push in pushes if push.name in SIX]
     campaign = replace(read_campaign(TILLER), drops=tuple(push.drop for push in chosen))
-    bench, nominal = prepare(
+    problem, nominal = prepare(
         campaign, RunStore(shared_store), measurements=Measurements(list(chosen)), workers=2
     )
-    rated = fit_hypothesis(bench, ("strength_rate",), (nominal.log_p_m, {"strength_rate": 0.1}))
+    rated = fit_hypothesis(problem, ("strength_rate",), (nominal.log_p_m, {"strength_rate": 0.1}))
     assert rated.evidence > nominal.evidence + 3.0
     value, sigma = rated.values["strength_rate"], math.sqrt(rated.covariance[1, 1])
     assert 0.0 < sigma < 0.04 and abs(value - 0.14) < 2.5 * math.hypot(sigma, 0.01)
-    gain = measure_gain(predict_held_out(bench, nominal), predict_held_out(bench, rated))
+    gain = measure_gain(predict_held_out(problem, nominal), predict_held_out(problem, rated))
     assert gain.fraction_removed > 0.8 and gain.log_score_difference > 3.0
 
 
@@ -141,12 +141,12 @@ def test_a_gauge_that_is_too_warm_is_told_from_a_strength_that_grows(
         noise = 0.02 * rng.standard_normal() + push.sigma * rng.standard_normal(push.depth.size)
         made.append(replace(push, resistance=np.log(read) + noise))
     campaign = replace(read_campaign(TILLER), drops=tuple(push.drop for push in made))
-    bench, nominal = prepare(
+    problem, nominal = prepare(
         campaign, RunStore(shared_store), measurements=Measurements(list(made)), workers=2
     )
     start = (nominal.log_p_m, {"gauge_warming": 3e4})
-    warm = fit_hypothesis(bench, ("gauge_warming",), start)
-    rated = fit_hypothesis(bench, ("strength_rate",), (nominal.log_p_m, {"strength_rate": 0.1}))
+    warm = fit_hypothesis(problem, ("gauge_warming",), start)
+    rated = fit_hypothesis(problem, ("strength_rate",), (nominal.log_p_m, {"strength_rate": 0.1}))
     assert warm.evidence > max(rated.evidence, nominal.evidence) + 3.0
     value, sigma = warm.values["gauge_warming"], math.sqrt(warm.covariance[1, 1])
     assert abs(value - 6e4) < 2.5 * sigma and sigma < 2e4

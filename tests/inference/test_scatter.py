@@ -12,9 +12,16 @@ from scipy.stats import halfnorm
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
-from labsim.inference.fits.fitting import goodness_of_fit
+from labsim.inference.fits.fitting import fit_p_value
 from labsim.inference.measure import measure
-from labsim.inference.scatter import WIDTH, allow_scatter, find_larger, find_scatter, set_terms, weigh_least
+from labsim.inference.scatter import (
+    WIDTH,
+    allow_scatter,
+    find_larger,
+    find_scatter,
+    set_error_budget,
+    weigh_least,
+)
 from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
@@ -23,7 +30,7 @@ OFFSETS = 0.12 * np.array([1.0, -1.2, 0.4, -0.7, 1.3, -0.9])  # of ln p_m, of th
 
 
 def set_residuals(scatter: float, seed: int, used: float = 0.02):
-    """A bench and a fit whose drops differ by ``scatter`` of ln p_m: points of 3e-6 m that p_m moves by 1e-4 m per ln."""
+    """A problem and a fit whose drops differ by ``scatter`` of ln p_m: points of 3e-6 m that p_m moves by 1e-4 m per ln."""
     rng = np.random.default_rng(seed)
     tangent = np.full(DROPS * POINTS, 1e-4)
     sections = {f"D{k}": slice(k * POINTS, (k + 1) * POINTS) for k in range(DROPS)}
@@ -37,8 +44,8 @@ def set_residuals(scatter: float, seed: int, used: float = 0.02):
     )
     campaign = SimpleNamespace(sample=SimpleNamespace(scatter=None))
     tracks = SimpleNamespace(samples={name: [name] for name in sections})
-    bench = SimpleNamespace(terms=SimpleNamespace(scatter=used), campaign=campaign, tracks=tracks)
-    return bench, SimpleNamespace(drops=drops)
+    problem = SimpleNamespace(budget=SimpleNamespace(scatter=used), campaign=campaign, tracks=tracks)
+    return problem, SimpleNamespace(drops=drops)
 
 
 @pytest.mark.parametrize(("scatter", "least"), [(0.02, 0), (0.06, 95), (0.10, 100)])
@@ -54,8 +61,8 @@ def test_a_larger_scatter_is_asked_for_where_samples_have_one(scatter, least):
 
 def test_prior_of_a_scatter_is_what_it_stands_for():
     """Against the exact likelihood of fifteen offsets with a free mean, each known to 3e-7 m/√6 over 1e-4 m."""
-    bench, fit = set_residuals(0.08, 5)
-    asked = find_scatter(bench, fit)
+    problem, fit = set_residuals(0.08, 5)
+    asked = find_scatter(problem, fit)
     assert 0.05 < asked.value < 0.13
     offsets = fit.drops.residual.reshape(DROPS, POINTS).mean(axis=1) / 1e-4
     squares, noise = np.sum((offsets - offsets.mean()) ** 2), (3e-3) ** 2 / POINTS
@@ -98,17 +105,17 @@ def one_rod(shared_store):
         ]
         store = RunStore(shared_store)
         measurements = replace(seen, drops=moved)
-        return prepare(other, store, terms=set_terms(other), workers=1, measurements=measurements)
+        return prepare(other, store, budget=set_error_budget(other), workers=1, measurements=measurements)
 
     return open_with
 
 
 def test_p_m_is_as_uncertain_as_its_samples_scatter(one_rod):
-    bench, fit = one_rod(OFFSETS)
-    wider, loose, scatter = allow_scatter(bench, fit)
+    problem, fit = one_rod(OFFSETS)
+    wider, loose, scatter = allow_scatter(problem, fit)
     assert scatter is not None and 0.06 < scatter.value < 0.25
-    assert wider.terms.scatter == scatter.value and bench.terms.scatter == 0.02
-    assert goodness_of_fit(fit) < goodness_of_fit(loose)
+    assert wider.budget.scatter == scatter.value and problem.budget.scatter == 0.02
+    assert fit_p_value(fit) < fit_p_value(loose)
     own, wide = (math.sqrt(each.covariance[0, 0]) for each in (fit, loose))
     added = math.sqrt(wide**2 - own**2)
     # in this campaign's likelihood all drops of a rod count about alike
@@ -116,11 +123,11 @@ def test_p_m_is_as_uncertain_as_its_samples_scatter(one_rod):
 
 
 def test_samples_alike_keep_the_least_scatter(one_rod):
-    bench, fit = one_rod(0 * OFFSETS)
-    assert allow_scatter(bench, fit)[1:] == (fit, None)
+    problem, fit = one_rod(0 * OFFSETS)
+    assert allow_scatter(problem, fit)[1:] == (fit, None)
 
 
 def test_a_stated_scatter_is_taken(one_rod):
-    bench, fit = one_rod(OFFSETS, stated=0.08)
-    assert bench.terms.scatter == 0.08
-    assert allow_scatter(bench, fit)[1:] == (fit, None)
+    problem, fit = one_rod(OFFSETS, stated=0.08)
+    assert problem.budget.scatter == 0.08
+    assert allow_scatter(problem, fit)[1:] == (fit, None)

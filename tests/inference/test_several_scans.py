@@ -10,25 +10,25 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.effects import Instrument
 from labsim.inference.calibrate import prepare
-from labsim.inference.fits.steps import Place, solve_at
+from labsim.inference.fits.steps import ParameterPoint, solve_at
 from labsim.inference.observations.compacted_zone import CompactedZones
-from labsim.inference.observations.drop_terms import Probe, Terms, measure_distances
+from labsim.inference.observations.linearised_drop import ErrorBudget, Perturbation, measure_distances
 
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory):
     """Block of one map, and of the same map twice over, about the nominal fit."""
     campaign = read_campaign(laws.write_campaign(tmp_path_factory.mktemp("scans") / "made", scan=True))
-    bench, fit = prepare(campaign, laws.LawStore(tmp_path_factory.mktemp("store")), workers=1)
-    [zone] = bench.scans
+    problem, fit = prepare(campaign, laws.LawStore(tmp_path_factory.mktemp("store")), workers=1)
+    [zone] = problem.scans
     scan = replace(zone.observed.scan, name="C02")
     zones = CompactedZones((zone, replace(zone, observed=replace(zone.observed, scan=scan))))
     names = ["D01", zone.name, scan.name]
-    probe = Probe({}, dict.fromkeys(names, Instrument()), {}, bench.campaign, 1.0)
-    one = solve_at(bench, Place(fit.log_p_m, {}, fit.nuisances)).blocks[1]
+    perturbation = Perturbation({}, dict.fromkeys(names, Instrument()), {}, problem.campaign, 1.0)
+    one = solve_at(problem, ParameterPoint(fit.log_p_m, {}, fit.nuisances)).blocks[1]
     speed = float(fit.nuisances[1][0])
-    both = zones.linearise(np.array([speed, speed]), fit.log_p_m, probe, Terms(), {})
-    return one, both, zones, zone.linearise(speed, fit.log_p_m, probe, Terms(), {})
+    both = zones.linearise(np.array([speed, speed]), fit.log_p_m, perturbation, ErrorBudget(), {})
+    return one, both, zones, zone.linearise(speed, fit.log_p_m, perturbation, ErrorBudget(), {})
 
 
 def test_each_map_by_itself_is_what_it_was(twice):

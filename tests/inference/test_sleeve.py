@@ -75,10 +75,10 @@ def fit(
     campaign: Campaign, pushes: list[ObservedPush], store: str, *causes: str
 ) -> tuple[list[str], Fit, Fit]:
     """Names of the data that are compared, the nominal fit, and that with causes."""
-    bench, nominal = prepare(campaign, RunStore(store), measurements=Measurements(list(pushes)), workers=2)
+    problem, nominal = prepare(campaign, RunStore(store), measurements=Measurements(list(pushes)), workers=2)
     start = (nominal.log_p_m, {name: 0.1 for name in causes})
-    names = [each.name for each in bench.observations]
-    return names, nominal, fit_hypothesis(bench, causes, start) if causes else nominal
+    names = [each.name for each in problem.observations]
+    return names, nominal, fit_hypothesis(problem, causes, start) if causes else nominal
 
 
 def test_the_ratio_of_a_run_is_that_of_an_even_sleeve() -> None:
@@ -116,12 +116,12 @@ def test_a_sleeve_that_does_not_count_changes_nothing(shared_store: str) -> None
     assert names == names_without == ["pushes"]
     assert with_sleeve.log_p_m == plain.log_p_m and with_sleeve.evidence == plain.evidence
     counted = choose(Sleeve(sigma=300.0, offset_sigma=1e3, compared=True))
-    bench, _ = prepare(
+    problem, _ = prepare(
         counted[0], RunStore(shared_store), measurements=Measurements(list(counted[1])), workers=2
     )
-    assert [each.name for each in bench.observations] == ["pushes", "sleeves"]
-    assert isinstance(bench.observations[1], SleeveFriction)
-    assert bench.observations[1].data.size == sum(push.windows.size for push in pushes)
+    assert [each.name for each in problem.observations] == ["pushes", "sleeves"]
+    assert isinstance(problem.observations[1], SleeveFriction)
+    assert problem.observations[1].data.size == sum(push.windows.size for push in pushes)
 
 
 def write_campaign(folder: Path, sleeve: bool, resistance: float, ratio: float) -> Campaign:

@@ -11,17 +11,17 @@ from labsim.effects import Normal, Parameter
 from labsim.inference.calibrate import warn_unsettled
 from labsim.inference.fits import fitting, steps
 from labsim.inference.fits.blocks import Block
-from labsim.inference.observations.drop_terms import Terms
+from labsim.inference.observations.linearised_drop import ErrorBudget
 
 RANGE = (300.0, 6000.0)
 
 
 def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
-    """A workbench of one block: predict(ln p_m, amplitude) -> (n,) prediction and its tangents (n, 2)."""
+    """A problem of one block: predict(ln p_m, amplitude) -> (n,) prediction and its tangents (n, 2)."""
     parameter = Parameter("amount", "1", 0.0, limits, Normal(0.0, 2.0), 1.0, "of a test")
     seen = []
 
-    def linearise(bench, nuisances, log_p_m, values, further=()):
+    def linearise(problem, nuisances, log_p_m, values, further=()):
         prediction, tangents = predict(log_p_m, values.get("effect", 0.0))
         seen.append(log_p_m)
         names = dict(zip(("ln_p_m", "effect"), np.atleast_2d(tangents).T, strict=False))
@@ -35,8 +35,8 @@ def a_bench(monkeypatch, predict, data, sigma, limits=(-10.0, 10.0)):
         effects={"effect": SimpleNamespace(amplitudes=[parameter])},
         observations=[SimpleNamespace(begin=lambda: np.empty(0), follow=lambda own, block, left: (own, 0.0))],
         shape_evidence={},
-        terms=Terms(),
-        costs_runs=lambda name: False,
+        budget=ErrorBudget(),
+        affects_simulation=lambda name: False,
         require_base_about=lambda log_p_m: None,
         seen=seen,
     )
@@ -54,26 +54,26 @@ def bend(monkeypatch):
 
 
 def test_a_step_that_leads_away_is_halved(monkeypatch):
-    bench, middle = bend(monkeypatch)
-    fit = fitting.fit_hypothesis(bench, (), (middle + 0.33, {}))
+    problem, middle = bend(monkeypatch)
+    fit = fitting.fit_hypothesis(problem, (), (middle + 0.33, {}))
     assert fit.log_p_m == pytest.approx(middle, abs=1e-4)
     assert fit.chi_square < 1e-3
     assert fit.unsettled < 0.05 and not warn_unsettled(fit)
 
 
 def test_plain_steps_run_away_there(monkeypatch):
-    bench, middle = bend(monkeypatch)
+    problem, middle = bend(monkeypatch)
     monkeypatch.setattr(fitting, "LOWER", math.inf)
-    fit = fitting.fit_hypothesis(bench, (), (middle + 0.33, {}))
+    fit = fitting.fit_hypothesis(problem, (), (middle + 0.33, {}))
     assert abs(fit.log_p_m - middle) > 0.3
     assert fit.unsettled > 1.0 and warn_unsettled(fit)[0].startswith("the fit still asks for a step of")
 
 
 def test_a_start_that_is_too_low_is_not_followed(monkeypatch):
-    bench, middle = bend(monkeypatch)
-    fit = fitting.fit_hypothesis(bench, (), (middle + 0.33, {}), least=-100.0)
+    problem, middle = bend(monkeypatch)
+    fit = fitting.fit_hypothesis(problem, (), (middle + 0.33, {}), least=-100.0)
     assert fit.log_p_m == middle + 0.33
-    assert set(bench.seen) == {middle + 0.33}
+    assert set(problem.seen) == {middle + 0.33}
 
 
 @pytest.mark.parametrize("hidden", [-1.5, -0.1, 0.4])
@@ -86,14 +86,14 @@ def test_an_amplitude_stopped_at_its_limit_leaves_p_m_at_its_best_there(monkeypa
     def predict(log_p_m, amplitude):
         return tangents @ np.array([log_p_m - middle, amplitude]), tangents
 
-    bench = a_bench(monkeypatch, predict, data, sigma, limits=(0.0, 10.0))
-    fit = fitting.fit_hypothesis(bench, ("effect",), (middle, {"effect": 1.0}))
+    problem = a_bench(monkeypatch, predict, data, sigma, limits=(0.0, 10.0))
+    fit = fitting.fit_hypothesis(problem, ("effect",), (middle, {"effect": 1.0}))
     alone = float(tangents[:, 0] @ data / (tangents[:, 0] @ tangents[:, 0]))
     if hidden < 0:
         assert fit.values["effect"] == 0.0
         assert fit.log_p_m - middle == pytest.approx(alone, abs=1e-6)
     low, high = (math.log(p) - middle for p in RANGE)
-    parameter = bench.effects["effect"].amplitudes[0]
+    parameter = problem.effects["effect"].amplitudes[0]
 
     def density(amplitude, moved):
         left = data - tangents @ np.array([moved, amplitude])
@@ -116,9 +116,9 @@ def test_p_m_stopped_at_its_end_leaves_an_amplitude_at_its_best_there(monkeypatc
     def predict(log_p_m, amplitude):
         return tangents @ np.array([log_p_m - high, amplitude]), tangents
 
-    bench = a_bench(monkeypatch, predict, data, sigma)
-    fit = fitting.fit_hypothesis(bench, ("effect",), (high - 0.6, {"effect": 0.0}))
-    parameter = bench.effects["effect"].amplitudes[0]
+    problem = a_bench(monkeypatch, predict, data, sigma)
+    fit = fitting.fit_hypothesis(problem, ("effect",), (high - 0.6, {"effect": 0.0}))
+    parameter = problem.effects["effect"].amplitudes[0]
     column = tangents[:, 1]
     best = float(column @ data / (column @ column + sigma**2 / parameter.scale**2))
     assert fit.log_p_m == pytest.approx(high, abs=1e-9)

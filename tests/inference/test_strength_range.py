@@ -30,7 +30,7 @@ def test_a_range_without_the_truth_is_said_first(tmp_path, p_m_range):
     assert low * (1 - 1e-9) <= p_m <= high * (1 + 1e-9)
     assert low * (1 - 1e-9) <= samples.min() and samples.max() <= high * (1 + 1e-9)
     if (low, high) == (300.0, 6000.0):  # as wide as the fit and other codes together
-        wide = math.hypot(math.sqrt(found.fit.covariance[0, 0]), found.bench.terms.other_codes)
+        wide = math.hypot(math.sqrt(found.fit.covariance[0, 0]), found.problem.budget.other_codes)
         assert np.std(np.log(samples)) == pytest.approx(wide, rel=0.05)
     apart = min(abs(math.log(p_m / end)) for end in p_m_range) / math.sqrt(found.fit.covariance[0, 0])
     (tmp_path / "out").mkdir()
@@ -58,7 +58,7 @@ def set_range(folder, p_m_range):
 def at_the_end(found) -> float:
     """χ² where p_m stays at the end nearest to the truth, nuisances at their best."""
     end = min(found.campaign.p_m_range, key=lambda p: abs(math.log(p / TRUE)))
-    fit = fitting.fit_hypothesis(found.bench, (), (math.log(end), {}), nuisances=found.fit, iterations=0)
+    fit = fitting.fit_hypothesis(found.problem, (), (math.log(end), {}), nuisances=found.fit, iterations=0)
     return fit.chi_square
 
 

@@ -14,7 +14,7 @@ from labsim.effects import list_effects
 from labsim.inference.fits.tangents import linearise_alone
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observations.undisturbed import UndisturbedDust, observe_undisturbed
-from labsim.inference.open_workbench import open_workbench
+from labsim.inference.open_problem import open_problem
 from labsim.records import Scan
 from labsim.runs.store import RunStore
 
@@ -44,13 +44,13 @@ def open_bench(campaign, drops, tmp_path, levels, rng, spread=1.0):
     dust = [make_dust(each, level, rng, spread) for each, level in zip(scans, levels, strict=True)]
     seen = Measurements(drops, dust=dust)
     with_scans = replace(campaign, scans=scans)
-    return open_workbench(
+    return open_problem(
         with_scans, RunStore(tmp_path), list_effects(), drops=seen.drops, undisturbed=seen.dust
     )
 
 
-def linearise_dust(bench, values, steps):
-    return linearise_alone(bench, bench.observations[-1], values, steps)
+def linearise_dust(problem, values, steps):
+    return linearise_alone(problem, problem.observations[-1], values, steps)
 
 
 def chi_square(block) -> float:
@@ -60,8 +60,8 @@ def chi_square(block) -> float:
 def test_flat_dust_fits_the_nominal_model(campaign, drops, tmp_path):
     values = []
     for seed in range(20):
-        bench = open_bench(campaign, drops, tmp_path, [0.15, 0.15], np.random.default_rng(seed))
-        block = linearise_dust(bench, {}, {})
+        problem = open_bench(campaign, drops, tmp_path, [0.15, 0.15], np.random.default_rng(seed))
+        block = linearise_dust(problem, {}, {})
         values.append(chi_square(block))
     # no more than the number of data, as the errors hold more than the noise drawn here
     assert np.mean(values) < block.residual.size
@@ -69,36 +69,36 @@ def test_flat_dust_fits_the_nominal_model(campaign, drops, tmp_path):
 
 
 def test_tangents_are_the_exact_differences(campaign, drops, tmp_path):
-    bench = open_bench(campaign, drops, tmp_path, [0.15], np.random.default_rng(1))
+    problem = open_bench(campaign, drops, tmp_path, [0.15], np.random.default_rng(1))
     steps = {"surface_crust": 0.01, "density_gradient": 1.0, "filling_factor": 0.004, "ct_scale": 0.01}
-    block = linearise_dust(bench, {}, steps)
-    length = shape_parameter(bench.effects["surface_crust"]).null
+    block = linearise_dust(problem, {}, steps)
+    length = shape_parameter(problem.effects["surface_crust"]).null
     assert block.tangents["surface_crust"][:-1] == pytest.approx(np.exp(-DEPTH / length), rel=1e-9)
     assert block.tangents["density_gradient"][:-1] == pytest.approx(DEPTH, rel=1e-9)
     assert block.tangents["filling_factor"][:-1] == pytest.approx(np.ones(DEPTH.size), rel=1e-9)
     assert block.tangents["ct_scale"][:-1] == pytest.approx(np.full(DEPTH.size, 0.15), rel=1e-9)
     assert np.all(block.tangents["ln_p_m"] == 0)
-    wide = linearise_dust(bench, {"ct_blur": 2 * bench.undisturbed[0].scan.voxel}, {})
+    wide = linearise_dust(problem, {"ct_blur": 2 * problem.undisturbed[0].scan.voxel}, {})
     assert wide.residual[-1] - block.residual[-1] == pytest.approx(-0.5 * math.log(5.0), rel=1e-9)
 
 
 def test_the_length_of_a_crust_is_taken_from_the_scans(campaign, drops, tmp_path):
     crust = 0.15 + 0.04 * np.exp(-DEPTH / 4.1e-4)
-    bench = open_bench(campaign, drops, tmp_path, [crust, crust], np.random.default_rng(2))
-    stated = shape_parameter(bench.effects["surface_crust"]).null
-    lay_out_shapes(bench)
-    assert shape_parameter(bench.effects["surface_crust"]).null == pytest.approx(4.1e-4, rel=0.03)
+    problem = open_bench(campaign, drops, tmp_path, [crust, crust], np.random.default_rng(2))
+    stated = shape_parameter(problem.effects["surface_crust"]).null
+    lay_out_shapes(problem)
+    assert shape_parameter(problem.effects["surface_crust"]).null == pytest.approx(4.1e-4, rel=0.03)
     assert stated != pytest.approx(4.1e-4, rel=0.03)
-    assert bench.shape_evidence["surface_crust"] < 0
-    assert any(name.startswith("strength_rate@") for name in bench.effects)  # no scan shows its exponent
+    assert problem.shape_evidence["surface_crust"] < 0
+    assert any(name.startswith("strength_rate@") for name in problem.effects)  # no scan shows its exponent
 
 
 def test_a_flat_sample_leaves_the_length_alone(campaign, drops, tmp_path):
-    bench = open_bench(campaign, drops, tmp_path, [0.15, 0.15], np.random.default_rng(3))
-    stated = shape_parameter(bench.effects["surface_crust"]).null
-    lay_out_shapes(bench)
-    assert shape_parameter(bench.effects["surface_crust"]).null == stated
-    assert "surface_crust" not in bench.shape_evidence
+    problem = open_bench(campaign, drops, tmp_path, [0.15, 0.15], np.random.default_rng(3))
+    stated = shape_parameter(problem.effects["surface_crust"]).null
+    lay_out_shapes(problem)
+    assert shape_parameter(problem.effects["surface_crust"]).null == stated
+    assert "surface_crust" not in problem.shape_evidence
 
 
 @pytest.mark.parametrize("blur", [0.7, 1.6])

@@ -37,7 +37,9 @@ def test_a_drop_that_shows_nothing_is_left_out_and_said(place):
     head, *rows = track.read_text().splitlines()
     track.write_text("\n".join([head, *rows[-15:]]) + "\n")  # begins below the surface
     found = diagnose_campaign(read_campaign(folder), laws.LawStore(place / "store"), workers=1)
-    assert [model.observed.name for model in found.bench.tracks.models if model.observed.name == "D02"] == []
+    assert [
+        model.observed.name for model in found.problem.tracks.models if model.observed.name == "D02"
+    ] == []
     assert any("drop D02 left out" in warning for warning in found.warnings)
 
 
@@ -69,5 +71,5 @@ def test_a_model_that_cannot_be_at_work_here_is_refused(place):
 def test_nested_sampling_agrees_with_the_formula_for_the_evidence(place, effect):
     campaign = read_campaign(laws.write_campaign(place / f"campaign-evidence-{effect}", rate=0.05))
     found = calibrate(campaign, ("p_m", effect), store=laws.LawStore(place / "store"))
-    nested, error = integrate_evidence(found.bench, found.fit)
+    nested, error = integrate_evidence(found.problem, found.fit)
     assert nested == pytest.approx(found.fit.evidence, abs=0.5 + 3 * error)

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from labsim.cli import app
 from labsim.report.figures.formats import further_formats
-from labsim.report.figures.look import new_figure
+from labsim.report.figures.style import new_figure
 
 
 def draw(path: Path) -> None:

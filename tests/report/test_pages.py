@@ -182,7 +182,7 @@ def test_maps_stand_side_by_side_with_their_difference(unknown: Path) -> None:
 def test_bands_hold_what_a_true_model_leaves(effect_found) -> None:  # type: ignore[no-untyped-def]
     from labsim.report.pages.drop_views import view_drops
 
-    views = view_drops(effect_found.bench, [("nominal", effect_found.nominal), ("true", effect_found.best)])
+    views = view_drops(effect_found.problem, [("nominal", effect_found.nominal), ("true", effect_found.best)])
     assert any(view.stands_out("nominal") for view in views)
     assert not any(view.stands_out("true") for view in views)
     for view in views:

@@ -16,7 +16,7 @@ def find(word, probabilities, value=1.06, learned=None, named=None, tests=()):
     posterior = SimpleNamespace(samples=lambda name: np.full(5, value))
     return SimpleNamespace(
         verdict=SimpleNamespace(word=word, probabilities=probabilities, named=named or probabilities[:1]),
-        bench=SimpleNamespace(effects=EFFECTS),
+        problem=SimpleNamespace(effects=EFFECTS),
         campaign=SimpleNamespace(strength_tests=tests),
         posterior_extended=posterior,
         learned=learned,

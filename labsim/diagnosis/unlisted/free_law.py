@@ -22,10 +22,10 @@ from ...inference.emulation.grid import Request
 from ...inference.emulation.nodes import amplitude_nodes, place_strength
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import log_share_inside
-from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, goodness_of_fit
+from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_p_value
 from ...inference.fits.steps import move_nuisances
 from ...inference.fits.tangents import linearise_at
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import FloatArray
 from ...runs.parts import Push
 from ..screen import has_runs
@@ -96,39 +96,42 @@ class Marginal:
     covariance: FloatArray
 
 
-def is_wanted(p_value: float, rivals: Sequence[Fit], without_place: float, predicted: float = 1.0) -> bool:
+def needs_free_law(
+    p_value: float, rivals: Sequence[Fit], log_evidence_unknown: float, predicted: float = 1.0
+) -> bool:
     """Whether a law in the equations can matter: the nominal model fails, and no listed cause fits, predicts held-out drops
-    (``predicted``, p value of the best) and stands far ahead of ``without_place``, ln evidence of the laws that cost no runs."""
+    (``predicted``, p value of the best) and stands far ahead of ``log_evidence_unknown``, ln evidence of the laws that cost no
+    runs."""
     best = max(rivals, key=lambda fit: fit.evidence, default=None)
     if p_value >= REJECTED:
         return False
-    if best is None or best.evidence < without_place + AHEAD:
+    if best is None or best.evidence < log_evidence_unknown + AHEAD:
         return True
-    return min(goodness_of_fit(best), predicted) < DOUBTFUL
+    return min(fit_p_value(best), predicted) < DOUBTFUL
 
 
-def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
+def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     """Runs of every hat by itself, then all data about the best law that they find; a hat whose runs fail is left out.
 
     Logarithms of depth and time are what hats change, in proportion to their coefficients, large and clear ones along
     further runs; p_m moves along its own.
     """
-    laws = list_laws(bench, fit)
+    laws = list_laws(problem, fit)
     index = round(place_strength(fit.log_p_m))  # not screening's, which may lie where soft dust costs most
-    bench.require_base([index])
+    problem.require_base([index])
     deepest = {
         run.setting: run.penetration_depth
-        for number in range(len(bench.families))
-        for run in bench.grid.stopped_runs(Request("", None, index), number) or ()
+        for number in range(len(problem.groups))
+        for run in problem.grid.stopped_runs(Request("", None, index), number) or ()
         if not isinstance(run, Push)
     }
     hats = {name: hat for law in laws for name, hat in make_hats(law, deepest).items()}
     # shares tables, runs and what they hold
-    terms = replace(bench.terms, numerical_change=ONE_AMPLITUDE)
-    free = replace(bench, effects={**bench.effects, **hats}, terms=terms)
+    budget = replace(problem.budget, numerical_change=ONE_AMPLITUDE)
+    free = replace(problem, effects={**problem.effects, **hats}, budget=budget)
     # at every speed: what a force at some depth changes has a peak where drops end there
     free.require_changes([(name, hat.amplitudes[0].step, index) for name, hat in hats.items()], "free law")
-    names = [name for name in hats if has_runs(bench, name)]
+    names = [name for name in hats if has_runs(problem, name)]
     scales = {hat: law.scale for law in laws for hat in law.hats}
     free, formulas, units = add_terms(free)
     scales |= units
@@ -137,11 +140,11 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
         replace(law, knots=tuple(knot for knot, hat in zip(law.knots, law.hats, strict=True) if hat in names))
         for law in laws
     )
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     nuisances, log_p_m = fit.nuisances, fit.log_p_m
     values = dict.fromkeys(names, 0.0)
     for rounds in range(ROUNDS + 1):
-        bench.require_base_about(log_p_m)
+        problem.require_base_about(log_p_m)
         blocks = linearise_at(free, nuisances, log_p_m, {**fit.values, **values})
         gram, log_determinant, points = gather(blocks, names, scales, values)
         drops = np.stack([blocks[0].tangents[name] * scales[name] for name in names], axis=1)
@@ -166,9 +169,9 @@ def fit_hats(bench: Workbench, fit: Fit) -> Tangents:
             if abs(best[name]) > max(CLEAR * width, hats[name].amplitudes[0].step)
         }
         bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
-        nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], coarse=True)]
+        nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], sparse=True)]
         free.require_changes(nodes, "free law, large")
-        nuisances, _ = move_nuisances(bench, nuisances, blocks, weighted)
+        nuisances, _ = move_nuisances(problem, nuisances, blocks, weighted)
     return found
 
 

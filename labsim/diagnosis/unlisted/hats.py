@@ -24,7 +24,7 @@ from ...inference.fits.fitting import Fit, fit_hypothesis
 from ...inference.observations.compacted_zone import CompactedZones
 from ...inference.observations.drop_model import DropModel
 from ...inference.observations.tracks import Tracks
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import Campaign, FloatArray
 from ...sph import DropSetting
 
@@ -63,10 +63,10 @@ class FreeLaw:
         return tuple(self.hat(k) for k in range(len(self.knots)))
 
 
-def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
+def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
     """The laws that are simulated, with the hats that these drops and scans reach."""
     deepest, fastest = 0.0, 0.0
-    for observation, nuisances in zip(bench.observations, fit.nuisances, strict=True):
+    for observation, nuisances in zip(problem.observations, fit.nuisances, strict=True):
         if isinstance(observation, Tracks):
             instants = observation.instants(nuisances)
             fastest = max([fastest, *(math.exp(instant.log_speed) for instant in instants)])
@@ -79,7 +79,7 @@ def list_laws(bench: Workbench, fit: Fit) -> tuple[FreeLaw, ...]:
     laws = []
     for place in LAW_PLACES.values():
         if place.over == "filling factor":
-            level, most = bench.campaign.sample.filling_factor, bench.campaign.material.phi_2
+            level, most = problem.campaign.sample.filling_factor, problem.campaign.material.phi_2
             dust = tuple(round(level + more, 6) for more in place.knots if level + more < most)
             laws.append(FreeLaw(place, dust, dust, (dust[0], dust[-1])))
         elif place.simulated:
@@ -136,32 +136,32 @@ def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, f
 
 
 def add_terms(
-    bench: Workbench, laws: Sequence[FreeLaw] = ()
-) -> tuple[Workbench, dict[str, Term], dict[str, float]]:
-    """The workbench with all terms that may be at work here among its effects; these; and of each the coefficient that changes as
+    problem: Problem, laws: Sequence[FreeLaw] = ()
+) -> tuple[Problem, dict[str, Term], dict[str, float]]:
+    """The problem with all terms that may be at work here among its effects; these; and of each the coefficient that changes as
     much as the law's scale where it is largest.
 
     laws : whose hats have runs; without any, the terms that need none. Not those that a cause of that name stands for, or which
     the data do not reach.
     """
     places = {law.name: law for law in laws if law.knots}
-    radii = np.unique([1e3 * family.projectile.tip_radius for family in bench.families])
+    radii = np.unique([1e3 * group.projectile.tip_radius for group in problem.groups])
     terms, units = {}, {}
     for name, term in list_terms().items():
-        if name in bench.effects:
+        if name in problem.effects:
             continue
         if term.place in places:
             largest = find_peak(term, places[term.place])
         elif term.acts.over == "radius of the tip" and len(radii) > 1:
             largest = 0.5 * float(np.ptp(term.shape(radii)))  # what all tips have in common is p_m
-        elif term.acts.see and any(isinstance(model, DropModel) for model in bench.tracks.models):
+        elif term.acts.see and any(isinstance(model, DropModel) for model in problem.tracks.models):
             largest = 1.0
         else:
             continue
         if largest > 0.0:
             terms[name], units[name] = term, term.acts.scale / largest
     effects = {name: make_effect(term, units[name]) for name, term in terms.items()}
-    return replace(bench, effects={**bench.effects, **effects}), terms, units
+    return replace(problem, effects={**problem.effects, **effects}), terms, units
 
 
 def find_peak(term: Term, law: FreeLaw) -> float:
@@ -169,10 +169,10 @@ def find_peak(term: Term, law: FreeLaw) -> float:
     return float(np.max(np.abs(shape_at(term, law, np.linspace(*law.reach, KNOTS)))))
 
 
-def fit_without_runs(bench: Workbench, nominal: Fit) -> dict[str, Fit]:
+def fit_without_runs(problem: Problem, nominal: Fit) -> dict[str, Fit]:
     """Every term that costs no runs, fitted: of the strength by the tip's radius, of the camera's clock. One whose fit leaves the
     range of the runs is left out."""
-    free, terms, _ = add_terms(bench)
+    free, terms, _ = add_terms(problem)
     fits = {}
     for name in terms:
         with suppress(ExtrapolationError):

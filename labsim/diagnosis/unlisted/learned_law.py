@@ -17,9 +17,9 @@ import numpy as np
 
 from ...effects.terms import KNOTS, Term, list_terms
 from ...errors import LabsimError
-from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis, goodness_of_fit
-from ...inference.fits.settle import list_large, settle
-from ...inference.workbench import Workbench
+from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis, fit_p_value
+from ...inference.fits.refine import list_large_effects, refine
+from ...inference.problem import Problem
 from ...records import FloatArray
 from ..explore import FACTORS, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
@@ -34,9 +34,9 @@ MOST_SIMULATED = (
 )
 ROUGH = 60.0
 MOST_SIBLINGS = 2  # of the same place as the best, likewise
-MOST_SETTLED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
+MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
-# a p_m that has run away the tangent may have the wrong sign: there coarse fits led to 1610 where 1790 is to be had
+# a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
 MOST_ANEW, SHARES = 2, (1.0, 2.0, 4.0, 8.0)
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
@@ -61,11 +61,11 @@ class Formula:
 
 @dataclass(frozen=True)
 class LearnedLaw:
-    """formulas : those that were simulated, the one with most evidence first; bench : with their terms among its effects.
+    """formulas : those that were simulated, the one with most evidence first; problem : with their terms among its effects.
     repeated : gain of the best on drops that neither fit has seen, both repeated without them."""
 
     formulas: tuple[Formula, ...]
-    bench: Workbench
+    problem: Problem
     repeated: Gain
 
     @property
@@ -78,14 +78,14 @@ class LearnedLaw:
         return [each for each in self.formulas[1:] if each.fit.evidence > self.best.fit.evidence - ALIKE]
 
 
-def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOut) -> LearnedLaw | None:
+def learn_law(problem: Problem, nominal: Fit, tangents: Tangents, before: HeldOut) -> LearnedLaw | None:
     """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
     and gives held-out drops a higher probability, the best of them where its fit is repeated without them too.
 
     before : the nominal model's predictions of held-out drops.
     """
-    free, terms, units = add_terms(bench, tangents.laws)
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    free, terms, units = add_terms(problem, tangents.laws)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
     fits = fit_formulas(free, nominal, [names for names, _ in chosen], units)
     formulas = []
@@ -98,7 +98,7 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
     if not formulas:
         return None
     formulas.sort(key=lambda each: -each.fit.evidence)
-    without = hold_out_folds(bench, nominal)
+    without = hold_out_folds(problem, nominal)
     for k, formula in enumerate(formulas):
         gain = measure_gain(without, hold_out_folds(free, formula.fit))
         if not gain.log_score_difference <= 0.0:
@@ -107,44 +107,44 @@ def learn_law(bench: Workbench, nominal: Fit, tangents: Tangents, before: HeldOu
 
 
 def fit_formulas(
-    bench: Workbench,
+    problem: Problem,
     nominal: Fit,
     chosen: Sequence[Hypothesis],
     units: Mapping[str, float],
 ) -> list[Fit]:
-    """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_SETTLED of
+    """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
     them among runs about themselves."""
-    coarse: list[Fit] = []
+    sparse: list[Fit] = []
     for names in chosen:  # before there are more runs, which few ones do not stand beside
-        top = max([nominal.evidence, *(fit.evidence for fit in coarse)])
+        top = max([nominal.evidence, *(fit.evidence for fit in sparse)])
         with suppress(LabsimError):
-            found = fit_from_strengths(bench, nominal, names, top)
-            coarse += [found] if found is not None else []
-    fits = _refine(bench, coarse, MOST_SIMULATED)
+            found = fit_from_strengths(problem, nominal, names, top)
+            sparse += [found] if found is not None else []
+    fits = _refine(problem, sparse, MOST_SIMULATED)
     best = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    if goodness_of_fit(best) < REJECTED:
-        singles = [names for names in chosen if len(names) == 1 and bench.costs_runs(*names)]
-        fits = take_better(fits, fit_anew(bench, nominal, singles, units))
-    fits += fit_siblings(bench, fits, units)
+    if fit_p_value(best) < REJECTED:
+        singles = [names for names in chosen if len(names) == 1 and problem.affects_simulation(*names)]
+        fits = take_better(fits, fit_anew(problem, nominal, singles, units))
+    fits += fit_siblings(problem, fits, units)
     fits.sort(key=lambda fit: -fit.evidence)
-    for k, fit in enumerate(fits[:MOST_SETTLED]):
-        if list_large(bench, fit):
+    for k, fit in enumerate(fits[:MOST_REFINED]):
+        if list_large_effects(problem, fit):
             with suppress(LabsimError):
-                fits[k] = settle(bench, fit)
+                fits[k] = refine(problem, fit)
     return fits
 
 
 def fit_anew(
-    bench: Workbench, nominal: Fit, singles: Sequence[Hypothesis], units: Mapping[str, float]
+    problem: Problem, nominal: Fit, singles: Sequence[Hypothesis], units: Mapping[str, float]
 ) -> list[Fit]:
     """The terms that get furthest before p_m is moved, fitted from there."""
     # few runs do not stand beside more: they get names of their own
-    probes = {f"{name} anew": bench.effects[name] for (name,) in singles}
-    probing = replace(bench, effects={**bench.effects, **probes})
+    probes = {f"{name} anew": problem.effects[name] for (name,) in singles}
+    probing = replace(problem, effects={**problem.effects, **probes})
     begun: dict[Hypothesis, list[Fit]] = {}
     for (name,), probe in zip(singles, probes, strict=True):
         sizes = [sign * share * units[name] for sign in (1.0, -1.0) for share in SHARES]
-        for strength in _list_strengths(bench, nominal):
+        for strength in _list_strengths(problem, nominal):
             starts = [fit for size in sizes for fit in _start(probing, probe, strength, size, nominal)]
             begun.setdefault((name,), []).extend(sorted(starts, key=lambda fit: -fit.evidence)[:1])
     best = {names: max(fit.evidence for fit in starts) for names, starts in begun.items() if starts}
@@ -152,27 +152,27 @@ def fit_anew(
     for names in sorted(best, key=lambda names: -best[names])[:MOST_ANEW]:
         for start in begun[names]:
             values = dict(zip(names, start.values.values(), strict=True))
-            fits += _fit(bench, names, (start.log_p_m, values), start)
+            fits += _fit(problem, names, (start.log_p_m, values), start)
     return fits
 
 
-def _list_strengths(bench: Workbench, nominal: Fit) -> list[float]:
+def _list_strengths(problem: Problem, nominal: Fit) -> list[float]:
     """ln of p_m to begin at, within its range."""
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     return sorted({min(max(nominal.log_p_m + math.log(factor), low), high) for factor in FACTORS})
 
 
-def _start(bench: Workbench, name: str, log_p_m: float, size: float, nominal: Fit) -> list[Fit]:
+def _start(problem: Problem, name: str, log_p_m: float, size: float, nominal: Fit) -> list[Fit]:
     """One amplitude at one strength, nuisances at their best; none beyond its limits, or where its runs fail."""
-    low, high = bench.effects[name].amplitudes[0].limits
+    low, high = problem.effects[name].amplitudes[0].limits
     if low < size < high:
         with suppress(LabsimError):
             begin = (log_p_m, {name: size})
-            return [fit_hypothesis(bench, (name,), begin, nuisances=nominal, coarse=True, iterations=0)]
+            return [fit_hypothesis(problem, (name,), begin, nuisances=nominal, sparse=True, iterations=0)]
     return []
 
 
-def fit_siblings(bench: Workbench, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
+def fit_siblings(problem: Problem, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
     """The other terms of the place of the best single one, begun where that one ended and as large: which form a law has cannot
     be told about a p_m that is far from the truth's."""
     singles = [fit for fit in fits if len(fit.hypothesis) == 1]
@@ -182,13 +182,13 @@ def fit_siblings(bench: Workbench, fits: Sequence[Fit], units: Mapping[str, floa
     (own,) = best.hypothesis
     place, size = list_terms()[own].place, best.values[own] / units[own]
     tried = {fit.hypothesis for fit in fits}
-    coarse = []
+    sparse = []
     for name in units:
         if list_terms()[name].place == place and (name,) not in tried:
             with suppress(LabsimError):
                 begin = (best.log_p_m, {name: size * units[name]})
-                coarse.append(fit_hypothesis(bench, (name,), begin, coarse=True, nuisances=best))
-    return _refine(bench, coarse, MOST_SIBLINGS)
+                sparse.append(fit_hypothesis(problem, (name,), begin, sparse=True, nuisances=best))
+    return _refine(problem, sparse, MOST_SIBLINGS)
 
 
 def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
@@ -200,21 +200,23 @@ def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
     return list(found.values())
 
 
-def _refine(bench: Workbench, coarse: Sequence[Fit], most: int) -> list[Fit]:
+def _refine(problem: Problem, sparse: Sequence[Fit], most: int) -> list[Fit]:
     """Those that come as far as the best of them by ROUGH, ``most`` at most, with runs of their own."""
-    top = max((fit.evidence for fit in coarse), default=0.0)
-    near = sorted((fit for fit in coarse if fit.evidence > top - ROUGH), key=lambda fit: -fit.evidence)
+    top = max((fit.evidence for fit in sparse), default=0.0)
+    near = sorted((fit for fit in sparse if fit.evidence > top - ROUGH), key=lambda fit: -fit.evidence)
     return [
-        fit for each in near[:most] for fit in _fit(bench, each.hypothesis, (each.log_p_m, each.values), each)
+        fit
+        for each in near[:most]
+        for fit in _fit(problem, each.hypothesis, (each.log_p_m, each.values), each)
     ]
 
 
 def _fit(
-    bench: Workbench, names: Hypothesis, start: tuple[float, Mapping[str, float]], known: Fit
+    problem: Problem, names: Hypothesis, start: tuple[float, Mapping[str, float]], known: Fit
 ) -> list[Fit]:
     """A formula fitted; none where its runs fail: it is no formula for this dust."""
     with suppress(LabsimError):
-        return [fit_hypothesis(bench, names, start, nuisances=known)]
+        return [fit_hypothesis(problem, names, start, nuisances=known)]
     return []
 
 

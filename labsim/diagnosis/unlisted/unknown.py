@@ -18,8 +18,8 @@ import numpy as np
 from ...effects.terms import list_terms
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import log_share_inside
-from ...inference.fits.fitting import DOUBTFUL, Fit, goodness_of_fit
-from ...inference.workbench import Workbench
+from ...inference.fits.fitting import DOUBTFUL, Fit, fit_p_value
+from ...inference.problem import Problem
 from ...records import FloatArray
 from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
 from .free_law import SIZES as LAW_SIZES
@@ -67,14 +67,14 @@ class UnknownFit:
     tangents: Tangents | None = None
 
 
-def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) -> UnknownFit:
+def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) -> UnknownFit:
     """Evidence of the nominal model plus a free law, at the nominal linearisation.
 
     tangents : of embedded laws, where those compete.
     """
-    drops, kinds = fit.drops, [each.kind for each in bench.observations]
-    coordinates = law_coordinates(bench, fit)
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    drops, kinds = fit.drops, [each.kind for each in problem.observations]
+    coordinates = law_coordinates(problem, fit)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     n = sum(block.residual.size for block in fit.blocks)
     terms: dict[str, list[float]] = {}
     best: tuple[float, str, float, FloatArray] | None = None
@@ -83,9 +83,9 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
             continue
         shape = law_covariance(coordinates, freedom.scales) if freedom.scales else None
         for size in SIZES:
-            free = [loosen(Block(drops.residual, drops.covariance, drops.tangents, shape), size)]
+            free = [inflate(Block(drops.residual, drops.covariance, drops.tangents, shape), size)]
             free += [
-                loosen(block, MAP_SHARE * size * (kind in freedom.kinds))
+                inflate(block, MAP_SHARE * size * (kind in freedom.kinds))
                 for kind, block in zip(kinds[1:], fit.blocks[1:], strict=True)
             ]
             step, variance, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
@@ -97,7 +97,7 @@ def fit_unknown(bench: Workbench, fit: Fit, tangents: Tangents | None = None) ->
             if best is None or evidence > best[0]:
                 law = size**2 * shape @ weighted[0] if shape is not None else np.zeros(drops.residual.size)
                 best = (evidence, name, size, law)
-    formulas = fit_without_runs(bench, fit) if goodness_of_fit(fit) < DOUBTFUL else {}
+    formulas = fit_without_runs(problem, fit) if fit_p_value(fit) < DOUBTFUL else {}
     if formulas:
         term, found = max(formulas.items(), key=lambda item: item[1].evidence)
         terms[list_terms()[term].title] = [each.evidence for each in formulas.values()]
@@ -135,14 +135,14 @@ def log_mean(values: Collection[float]) -> float:
     return top + math.log(sum(math.exp(value - top) for value in values) / len(values))
 
 
-def loosen(block: Block, size: float) -> Block:
+def inflate(block: Block, size: float) -> Block:
     """The block with its free covariance, of this size, among its errors."""
     if block.free is None or size == 0.0:
         return block
     return replace(block, covariance=block.covariance + size**2 * block.free)
 
 
-def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
+def law_coordinates(problem: Problem, fit: Fit) -> dict[str, FloatArray]:
     """Per datum: depth reached (m; of an accelerometer the acceleration, m/s²), fraction of the way,
     ln of speed² over radius, ln radius, ln mass per radius³."""
     parts: dict[str, list[FloatArray]] = {
@@ -152,7 +152,7 @@ def law_coordinates(bench: Workbench, fit: Fit) -> dict[str, FloatArray]:
         "radius": [],
         "mass": [],
     }
-    tracks = bench.tracks
+    tracks = problem.tracks
     for model, instant in zip(tracks.models, tracks.instants(fit.nuisances[0]), strict=True):
         section = fit.drops.sections[model.observed.name]
         n = section.stop - section.start

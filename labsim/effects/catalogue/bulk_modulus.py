@@ -1,6 +1,6 @@
 """The dust is stiffer or softer elastically: K(φ0') = K0 (φ0'/0.15)^γ with another K0, and μ = shear_to_bulk K with it."""
 
-from labsim.effects import LogNormal, Parameter, list_thrown
+from labsim.effects import LogNormal, Parameter, list_impacts
 
 title = "The bulk modulus differs"
 says = ("The dust is softer than its bulk modulus says", "The dust is stiffer than its bulk modulus says")
@@ -11,7 +11,7 @@ needs = ("bulk_modulus", "shear_to_bulk")
 def parameters(campaign):
     nominal, dust = campaign.material, campaign.sample
     # the tip must stay slower than sound in the dust
-    fastest = max(speed for _, _, speed in list_thrown(campaign))
+    fastest = max(speed for _, _, speed in list_impacts(campaign))
     density = dust.monomer_density * dust.filling_factor
     least = 2.0 * density * fastest**2 / (1.0 + 4.0 / 3.0 * nominal.shear_to_bulk)
     low = min(max(nominal.bulk_modulus / 50.0, least, 500.0), 0.9 * nominal.bulk_modulus)

@@ -1,6 +1,6 @@
 """The filling factor changes linearly with depth: φ0 + gradient depth."""
 
-from labsim.effects import Normal, Parameter, deepest_dust, list_thrown
+from labsim.effects import Normal, Parameter, deepest_dust, list_impacts
 from labsim.sph.setting import LEAST_GRADED, LOOSEST
 
 title = "The filling factor changes with depth"
@@ -13,7 +13,7 @@ def parameters(campaign):
     phi, material = campaign.sample.filling_factor, campaign.material
     depth = deepest_dust(campaign)
     steepest = 0.6 * (material.phi_2 - phi) / depth
-    largest = max(radius for radius, _, _ in list_thrown(campaign))
+    largest = max(radius for radius, _, _ in list_impacts(campaign))
     # falling, φ0 stays as it is from near φ1 on; that must lie below what the projectile acts on
     loosening = max(0.9 * (phi - material.phi_1 - LOOSEST) / (LEAST_GRADED * largest), 0.0)
     return (

@@ -5,7 +5,7 @@ changes nothing. The effect is far from linear: the depth changes by 0.1 % where
 point of the tip, by 1 to 2 % at 0.4 radii, by 4 to 8 % at none (p_m 1300 Pa, 0.5 and 1 m/s, five spacings a radius).
 """
 
-from labsim.effects import Parameter, Uniform, all_pushed, deepest_expected, list_thrown
+from labsim.effects import Parameter, Uniform, all_pushed, deepest_expected, list_impacts
 from labsim.sph.particles import WALL_LAYERS
 
 title = "The sample is shallower than stated"
@@ -14,7 +14,7 @@ kind = "sample"
 
 def parameters(campaign):
     stated = campaign.sample.depth
-    largest = max(radius for radius, _, _ in list_thrown(campaign))
+    largest = max(radius for radius, _, _ in list_impacts(campaign))
     felt = min(0.9 * deepest_expected(campaign) + 0.5 * largest, 0.8 * stated)
     low = min(largest, 0.5 * felt)
     return (

@@ -26,13 +26,13 @@ Changes = dict[float, dict[float, FloatArray]]
 
 @dataclass
 class ResponseTable:
-    """Codes of one family. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
+    """Codes of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds, or at
     the few. fingerprints : the same at the few speeds, taken where there are no changes. parameters : of effects whose amplitudes
     have a grade of their own."""
 
     log_speeds: FloatArray
-    few: tuple[int, ...]
+    sparse: tuple[int, ...]
     base: dict[float, FloatArray] = field(default_factory=dict)
     changes: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
@@ -100,8 +100,8 @@ class Response:
             raise ExtrapolationError("simulation", name, "every run with it failed; see labsim runs")
         across = self.across
         if len(next(iter(runs[indices[0]].values()))) < across.size:
-            few = self.table.log_speeds[list(self.table.few)]
-            across = interpolation_weights(few, self.log_speed)
+            sparse = self.table.log_speeds[list(self.table.sparse)]
+            across = interpolation_weights(sparse, self.log_speed)
         nodes = _log_strengths(indices)
         margin = 0.5 * math.log(STRENGTH_RATIO)
         inside = min(max(self.log_p_m, min(nodes) - margin), max(nodes) + margin)

@@ -57,49 +57,49 @@ RunKey = tuple[str, float, bool, bool, int]
 
 
 @dataclass(frozen=True)
-class Family:
+class ProjectileGroup:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
-    few : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change; of scans,
-    which have a speed of their own, all that effects change. pushed : led through the ground at these speeds, not dropped.
-    felt : an accelerometer is on some of them.
+    sparse : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change; of
+    scans, which have a speed of their own, all that effects change. pushed : led through the ground at these speeds, not
+    dropped. felt : an accelerometer is on some of them.
     """
 
     projectile: Projectile
     speeds: tuple[float, ...]
     is_scan: bool
-    few: tuple[int, ...]
+    sparse: tuple[int, ...]
     pushed: bool = False
     felt: bool = False
 
-    def positions(self, few: bool, coarse: bool) -> Sequence[int]:
+    def positions(self, sparse: bool, coarse: bool) -> Sequence[int]:
         """At which speeds a request has runs."""
-        return self.few if few or (coarse and self.is_scan) else range(len(self.speeds))
+        return self.sparse if sparse or (coarse and self.is_scan) else range(len(self.speeds))
 
-    def spacings(self, few: bool, position: int, changed: bool) -> tuple[float, ...]:
-        """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``few``), and what
+    def spacings(self, sparse: bool, position: int, changed: bool) -> tuple[float, ...]:
+        """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``sparse``), and what
         is changed by a cause, have one."""
-        if not self.felt or few:
+        if not self.felt or sparse:
             return (1.0,)
         return (FELT_SPACINGS[position % len(FELT_SPACINGS)],) if changed else FELT_SPACINGS
 
 
 @dataclass(frozen=True)
 class Request:
-    """Runs of all families at one p_m node. variant : a name for ``change``, empty for the nominal model.
+    """Runs of all groups at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    few : at the few speeds that fingerprints need. coarse : at the spacing of what effects change, not at that of fits.
+    sparse : at the few speeds that fingerprints need. coarse : at the spacing of what effects change, not at that of fits.
     """
 
     variant: str
     change: Change | None
     index: float
-    few: bool = False
+    sparse: bool = False
     coarse: bool = False
 
     def of(self, number: int) -> RunKey:
-        """Under what the runs of one family are kept."""
-        return self.variant, self.index, self.few, self.coarse, number
+        """Under what the runs of one group are kept."""
+        return self.variant, self.index, self.sparse, self.coarse, number
 
 
 def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
@@ -126,10 +126,10 @@ def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
 def scan_speeds(speeds: Sequence[float]) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Nodes at the speeds of scans, of three digits, at least two of them; and those that effects are simulated at."""
     nodes = _merge_speeds(speeds)
-    few = range(len(nodes))
+    sparse = range(len(nodes))
     if len(nodes) == 1:
         nodes = [nodes[0], nodes[0] * SCAN_STEP]
-    return tuple(float(f"{node:.3g}") for node in nodes), tuple(few)
+    return tuple(float(f"{node:.3g}") for node in nodes), tuple(sparse)
 
 
 def _merge_speeds(speeds: Sequence[float]) -> list[float]:
@@ -145,7 +145,7 @@ def _merge_speeds(speeds: Sequence[float]) -> list[float]:
     return [math.sqrt(each[0] * each[-1]) for each in alike]
 
 
-def few_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
+def sparse_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
     """Two neighbouring nodes where they enclose all speeds, else both ends and the middle."""
     below = max(int(np.searchsorted(speeds, slowest * (1 + 1e-9))) - 1, 0)
     above = min(int(np.searchsorted(speeds, fastest * (1 - 1e-9))), len(speeds) - 1)
@@ -257,11 +257,11 @@ def hasten(setting: DropSetting) -> DropSetting:
 
 @dataclass
 class RunGrid:
-    """Access to runs of a request and family, each in the order of its speeds, and of the spacings at each."""
+    """Access to runs of a request and group, each in the order of its speeds, and of the spacings at each."""
 
     campaign: Campaign
     store: RunStore
-    families: Sequence[Family]
+    groups: Sequence[ProjectileGroup]
     cells: int = DEFAULT_CELLS
     workers: int | None = None
     scheduler: str | None = None
@@ -269,17 +269,17 @@ class RunGrid:
     extension: Change | None = None  # of the nominal model, by a model.toml
     runs: dict[RunKey, list[AnyPart | FailedRun]] = field(default_factory=dict)
 
-    def setting(self, family: Family, speed: float, p_m: float, coarse: bool = False) -> DropSetting:
+    def setting(self, group: ProjectileGroup, speed: float, p_m: float, coarse: bool = False) -> DropSetting:
         """The nominal model of the campaign for one node."""
         usual = self.cells
-        if family.felt:
+        if group.felt:
             usual = max(self.cells, FELT_CELLS)
         elif coarse:
             usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
         of_scan = COARSE_SCAN_CELLS if coarse else SCAN_CELLS
-        own = of_scan if family.is_scan else PUSH_CELLS if family.pushed else usual
-        setting = set_nominal_drop(self.campaign, family.projectile, speed, p_m, own)
-        if family.pushed:
+        own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
+        setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own)
+        if group.pushed:
             setting = set_push(setting, speed)
         return setting if self.extension is None else self.extension(setting)
 
@@ -288,24 +288,24 @@ class RunGrid:
         missing = [
             (request, number)
             for request in dict.fromkeys(wanted)
-            for number in range(len(self.families))
+            for number in range(len(self.groups))
             if request.of(number) not in self.runs
         ]
         settings, places = [], []
         parts: list[Part] = []
         for request, number in missing:
-            family = self.families[number]
-            positions = family.positions(request.few, request.coarse)
+            group = self.groups[number]
+            positions = group.positions(request.sparse, request.coarse)
             changed = request.variant != ""
-            laid = [(k, factor) for k in positions for factor in family.spacings(request.few, k, changed)]
+            laid = [(k, factor) for k in positions for factor in group.spacings(request.sparse, k, changed)]
             for position, factor in laid:
                 setting = self.setting(
-                    family, family.speeds[position], strength_node(request.index), request.coarse
+                    group, group.speeds[position], strength_node(request.index), request.coarse
                 )
                 setting = request.change(setting) if request.change is not None else setting
                 setting = setting.replace(spacing=factor * setting.spacing)
-                settings.append(hasten(setting) if family.pushed else setting)
-                parts.append(Push if family.pushed else Compaction if family.is_scan else Motion)
+                settings.append(hasten(setting) if group.pushed else setting)
+                parts.append(Push if group.pushed else Compaction if group.is_scan else Motion)
             places.append((request, number, len(laid)))
         if not settings:
             return
@@ -323,7 +323,7 @@ class RunGrid:
             at += count
 
     def stopped_runs(self, request: Request, number: int) -> list[AnyPart] | None:
-        """Runs of one family, in the order of its speeds and spacings, or None where one failed or never stopped."""
+        """Runs of one group, in the order of its speeds and spacings, or None where one failed or never stopped."""
         runs = self.runs[request.of(number)]
         good = [run for run in runs if not isinstance(run, FailedRun) and run.stopped]
         return good if len(good) == len(runs) else None

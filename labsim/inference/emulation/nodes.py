@@ -55,7 +55,7 @@ def amplitude_nodes(
     effect: Effect,
     amplitude: float,
     *,
-    coarse: bool = False,
+    sparse: bool = False,
     around: bool = False,
     bent: bool = False,
     side: float = 1.0,
@@ -63,7 +63,7 @@ def amplitude_nodes(
     """Amplitudes to simulate about an estimate: multiples of the effect's step by their grade, at least one, inside its limits.
 
     side : 1 or -1, of the step, at a null. around : one more beyond them, so that the curve between two does not depend on the
-    side that the estimate came from. bent : between nodes a quarter of the step apart, half of it beyond the first. coarse :
+    side that the estimate came from. bent : between nodes a quarter of the step apart, half of it beyond the first. sparse :
     with few of them.
     """
     parameter = effect.amplitudes[0]
@@ -75,9 +75,9 @@ def amplitude_nodes(
     if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
         wanted = [sign]
     else:
-        ladder = [1.0, 3.0, 8.0] if coarse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
+        ladder = [1.0, 3.0, 8.0] if sparse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
         if bent:
-            ladder = sorted({0.5, *ladder} if coarse else {0.25, 0.5, 0.75, 1.5, *ladder})
+            ladder = sorted({0.5, *ladder} if sparse else {0.25, 0.5, 0.75, 1.5, *ladder})
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
         below = [m for m in ladder if m < abs(place)] or above[1:2]
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]

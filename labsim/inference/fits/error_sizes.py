@@ -1,7 +1,7 @@
 """How large the solver's error of what an effect changes is, is not known: it is integrated over.
 
-Codes differ by some share of what an effect changes (Terms.numerical_change, zone_change), in some campaigns by half of it, in
-others by twice. Held at one size, that error tells of the parameters: where p_m and an effect make up for each other the
+Codes differ by some share of what an effect changes (ErrorBudget.numerical_change, zone_change), in some campaigns by half of
+it, in others by twice. Held at one size, that error tells of the parameters: where p_m and an effect make up for each other the
 change grows along them, so does the error, and the data ask for as much change as brings the error that they show. With ln of
 the size normal about the stated one, SPREAD wide, the same likelihood asks for another size instead.
 """
@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from ...records import FloatArray
-from ..workbench import Workbench
+from ..problem import Problem
 from .blocks import Block
 from .fitting import Fit
 from .tangents import linearise_at
@@ -29,7 +29,7 @@ SIZES = np.linspace(-1.5, 1.5, 7)  # ln of sizes over the stated ones
 PLACES = np.linspace(-6.0, 6.0, 7)  # of ln p_m, in standard deviations of the fit
 
 
-def integrate_sizes(bench: Workbench, fit: Fit, target: Target) -> Callable[[FloatArray], FloatArray]:
+def integrate_sizes(problem: Problem, fit: Fit, target: Target) -> Callable[[FloatArray], FloatArray]:
     """What the posterior over sizes gains on ``target``, as a function of ln p_m, (m,) -> (m,).
 
     Measured where the amplitudes are at their best at each p_m, nought at the fit.
@@ -58,22 +58,22 @@ def integrate_sizes(bench: Workbench, fit: Fit, target: Target) -> Callable[[Flo
         amplitudes = near + sigma * found.x
         kept = -float(target.misfit(np.array([[place, *amplitudes]]))[0])
         values = dict(zip(fit.hypothesis, amplitudes, strict=True))
-        gained.append(_integrate_likelihood(bench, fit, float(place), values) - kept)
+        gained.append(_integrate_likelihood(problem, fit, float(place), values) - kept)
     curve = CubicSpline(places, gained)
     here = float(curve(np.clip(fit.log_p_m, low, high)))
     return lambda at: np.asarray(curve(np.clip(at, places[0], places[-1])) - here)
 
 
-def _integrate_likelihood(bench: Workbench, fit: Fit, log_p_m: float, amplitudes: dict[str, float]) -> float:
+def _integrate_likelihood(problem: Problem, fit: Fit, log_p_m: float, amplitudes: dict[str, float]) -> float:
     """ln likelihood, over all sizes of the drops' error and, on its own, of the maps'; up to a constant."""
     drops, maps = [], []
     for size in SIZES:
-        terms = replace(
-            bench.terms,
-            numerical_change=bench.terms.numerical_change * math.exp(size),
-            zone_change=bench.terms.zone_change * math.exp(size),
+        budget = replace(
+            problem.budget,
+            numerical_change=problem.budget.numerical_change * math.exp(size),
+            zone_change=problem.budget.zone_change * math.exp(size),
         )
-        blocks = linearise_at(replace(bench, terms=terms), fit.nuisances, log_p_m, amplitudes)
+        blocks = linearise_at(replace(problem, budget=budget), fit.nuisances, log_p_m, amplitudes)
         drops.append(_log_likelihood(blocks[:1]))
         maps.append(_log_likelihood(blocks[1:]))
     return _over_sizes(drops) + _over_sizes(maps)

@@ -10,25 +10,25 @@ from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
 from ...records import FloatArray
-from ..workbench import Workbench
+from ..problem import Problem
 from .steps import Solved, stop_at_limits
 
 MOST_CUT = 1.0 - 1e-12  # of a Gaussian, by two limits closer than rounding
 
 
-def integrate_by_laplace(bench: Workbench, here: Solved) -> float:
+def integrate_by_laplace(problem: Problem, here: Solved) -> float:
     """ln evidence by Laplace's formula, where a limit cuts the Gaussian, or its top, off too."""
     place, covariance = here.place, here.covariance
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     evidence = here.log_likelihood + 0.5 * len(covariance) * math.log(2 * math.pi)
     evidence += 0.5 * np.linalg.slogdet(covariance)[1] - math.log(high - low)
     limits = [(low - place.log_p_m, high - place.log_p_m)]
     for name, value in place.values.items():
-        parameter = bench.effects[name].amplitudes[0]
+        parameter = problem.effects[name].amplitudes[0]
         least, most = parameter.limits
         limits.append((least - parameter.null - value, most - parameter.null - value))
-        evidence += float(parameter.log_prior(parameter.hold(value))) + bench.shape_evidence.get(name, 0.0)
-    step, stopped = stop_at_limits(bench, here)
+        evidence += float(parameter.log_prior(parameter.hold(value))) + problem.shape_evidence.get(name, 0.0)
+    step, stopped = stop_at_limits(problem, here)
     for k, between in enumerate(limits):
         sigma = math.sqrt(covariance[k, k])
         if k in stopped:

@@ -16,17 +16,17 @@ from scipy.stats import chi2
 from ...records import FloatArray
 from ..emulation.nodes import amplitude_nodes, nearest_nodes, nodes_around, screening_node
 from ..observations.tracks import DropsBlock
-from ..workbench import Workbench
+from ..problem import Problem
 from .blocks import Block
 from .evidence import integrate_by_laplace
 from .steps import (
     LOWER,
-    Place,
+    ParameterPoint,
     Solved,
     advance,
+    converge_nuisances,
     hold,
     hold_strength,
-    settle_nuisances,
     solve_at,
     stop_at_limits,
 )
@@ -36,7 +36,7 @@ Hypothesis = tuple[str, ...]
 # a fit has this many steps; beyond PATIENT each has to gain more than LOWER, but not where accelerometers are: there p_m and a
 # strength lie in a valley so bent that fits from the nominal p_m were left halfway, up to 12 below the top in ln evidence
 ITERATIONS, PATIENT = 40, 12
-# p values of goodness_of_fit, one policy for all who ask: below the first a model may fail, and what else explains the data is
+# p values of fit_p_value, one policy for all who ask: below the first a model may fail, and what else explains the data is
 # looked for where that costs nothing; below the second it fails, and runs are made to find out why
 DOUBTFUL, REJECTED = 0.05, 0.01
 MOST_HALVED = 3  # times a step is
@@ -89,11 +89,11 @@ class Fit:
 
 
 def fit_hypothesis(
-    bench: Workbench,
+    problem: Problem,
     hypothesis: Hypothesis,
     start: tuple[float, Mapping[str, float]],
     *,
-    coarse: bool = False,
+    sparse: bool = False,
     around: bool = False,
     nuisances: Fit | None = None,
     iterations: int = ITERATIONS,
@@ -102,41 +102,41 @@ def fit_hypothesis(
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
     A step that ends lower than it began, by more than LOWER, is halved until it does not, MOST_HALVED times at most.
-    coarse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
+    sparse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
     least : ln likelihood, priors included, of a start below which no step is taken.
     iterations : most steps of the globals; with none they stay, and the nuisances alone are moved to their best.
     """
-    begin = tuple(each.begin() for each in bench.observations) if nuisances is None else nuisances.nuisances
-    values = {name: hold(bench, name, start[1].get(name, 0.0)) for name in hypothesis}
-    place = Place(hold_strength(bench, start[0]), values, begin)
+    begin = tuple(each.begin() for each in problem.observations) if nuisances is None else nuisances.nuisances
+    values = {name: hold(problem, name, start[1].get(name, 0.0)) for name in hypothesis}
+    place = ParameterPoint(hold_strength(problem, start[0]), values, begin)
     best: Solved | None = None
     share, settled, calm = 1.0, False, False
     gain = math.inf
     for iteration in range(iterations + 1):
-        _ask(bench, hypothesis, place.log_p_m, place.values, coarse=coarse, around=around)
-        there = solve_at(bench, place)
-        if best is not None and there.height < best.height - LOWER:
-            # heights compare where nuisances are at their best; the runs made since count for both
-            best = settle_nuisances(bench, solve_at(bench, best.place), 0 if calm else MOST_NUISANCES)
+        _ask(problem, hypothesis, place.log_p_m, place.values, sparse=sparse, around=around)
+        there = solve_at(problem, place)
+        if best is not None and there.log_posterior < best.log_posterior - LOWER:
+            # posteriors compare where nuisances are at their best; the runs made since count for both
+            best = converge_nuisances(problem, solve_at(problem, best.place), 0 if calm else MOST_NUISANCES)
             calm = True
-            if there.height < best.height - LOWER:
-                there = settle_nuisances(bench, there, 1)
-        if best is None or there.height >= best.height - LOWER:
-            gain = math.inf if best is None else there.height - best.height
+            if there.log_posterior < best.log_posterior - LOWER:
+                there = converge_nuisances(problem, there, 1)
+        if best is None or there.log_posterior >= best.log_posterior - LOWER:
+            gain = math.inf if best is None else there.log_posterior - best.log_posterior
             best, share, calm = there, 1.0, False
         else:
             share *= 0.5
-        if settled or share < 0.5**MOST_HALVED or best.height < least:
+        if settled or share < 0.5**MOST_HALVED or best.log_posterior < least:
             break
-        place, settled = advance(bench, best, share)
+        place, settled = advance(problem, best, share)
         settled = settled and iteration > 0
-        if iteration >= PATIENT and gain <= LOWER and not bench.felt:
+        if iteration >= PATIENT and gain <= LOWER and not problem.felt:
             break
     assert best is not None
     if not (settled or calm):
-        best = settle_nuisances(bench, best, MOST_NUISANCES)
-    step = np.abs(stop_at_limits(bench, best)[0]) / np.sqrt(np.diag(best.covariance))
+        best = converge_nuisances(problem, best, MOST_NUISANCES)
+    step = np.abs(stop_at_limits(problem, best)[0]) / np.sqrt(np.diag(best.covariance))
     return Fit(
         hypothesis,
         best.place.log_p_m,
@@ -145,15 +145,15 @@ def fit_hypothesis(
         best.chi_square,
         best.points,
         best.log_likelihood,
-        integrate_by_laplace(bench, best),
+        integrate_by_laplace(problem, best),
         best.blocks,
         best.place.nuisances,
         unsettled=float(step.max()),
-        between_codes=bench.terms.other_codes,
+        between_codes=problem.budget.other_codes,
     )
 
 
-def goodness_of_fit(fit: Fit) -> float:
+def fit_p_value(fit: Fit) -> float:
     """p value of χ², the smallest of the drops' and of the scans' own, times their number.
 
     Contact time and speed of each drop are free; parts that are known better than they scatter do not hide one that fails.
@@ -168,35 +168,37 @@ def rate_block(block: Block, hypothesis: Hypothesis) -> float:
     return float(chi2.sf(block.chi_square, max(block.residual.size - free, 1)))
 
 
-def with_probes(bench: Workbench, fit: Fit, names: Sequence[str], log_p_m: float | None = None) -> Blocks:
+def with_perturbations(
+    problem: Problem, fit: Fit, names: Sequence[str], log_p_m: float | None = None
+) -> Blocks:
     """The observations about a fit (or of its nuisances at another p_m) with tangents of further effects at their null."""
     place = fit.log_p_m if log_p_m is None else log_p_m
-    return linearise_at(bench, fit.nuisances, place, fit.values, names)
+    return linearise_at(problem, fit.nuisances, place, fit.values, names)
 
 
 def _ask(
-    bench: Workbench,
+    problem: Problem,
     hypothesis: Hypothesis,
     log_p_m: float,
     values: Mapping[str, float],
     *,
-    coarse: bool,
+    sparse: bool,
     around: bool,
 ) -> None:
-    bench.require_base_about(log_p_m)
-    indices: list[float] = [screening_node(log_p_m)] if coarse else nearest_nodes(log_p_m, bench.node_step)
+    problem.require_base_about(log_p_m)
+    indices: list[float] = [screening_node(log_p_m)] if sparse else nearest_nodes(log_p_m, problem.node_step)
     if around:
         indices = nodes_around(log_p_m)
-        bench.require_base(indices)
+        problem.require_base(indices)
     wanted = [
         (name, amplitude, index)
         for name in hypothesis
-        if bench.costs_runs(name)
+        if problem.affects_simulation(name)
         # on a straight line a crust of a fifth of a long step is off by a tenth of itself
         for amplitude in amplitude_nodes(
-            bench.effects[name], values[name], coarse=coarse, around=around, bent=bench.felt
+            problem.effects[name], values[name], sparse=sparse, around=around, bent=problem.felt
         )
         for index in indices
     ]
     if wanted:
-        bench.require_changes(wanted, " and ".join(hypothesis), few=coarse)
+        problem.require_changes(wanted, " and ".join(hypothesis), sparse=sparse)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...records import FloatArray
-from ..workbench import Workbench
+from ..problem import Problem
 from .blocks import Block, solve_globals
 from .tangents import Blocks, linearise_at
 
@@ -20,7 +20,7 @@ OVERSHOOTS = 0.7  # of the last move of nuisances: they go to and fro
 
 
 @dataclass(frozen=True)
-class Place:
+class ParameterPoint:
     """Where a fit stands. nuisances : of every observation."""
 
     log_p_m: float
@@ -32,61 +32,65 @@ class Place:
 class Solved:
     """The likelihood about a place, and the Gauss-Newton step from there.
 
-    log_likelihood : of the place itself; height : with the Gaussians that stand for the priors of amplitudes.
+    log_likelihood : of the place itself; log_posterior : with the Gaussians that stand for the priors of amplitudes.
     """
 
-    place: Place
+    place: ParameterPoint
     blocks: Blocks
     step: FloatArray
     covariance: FloatArray
     chi_square: float
     points: int
     log_likelihood: float
-    height: float
+    log_posterior: float
 
 
-def solve_at(bench: Workbench, place: Place) -> Solved:
+def solve_at(problem: Problem, place: ParameterPoint) -> Solved:
     """The likelihood about a place with the runs that there are."""
-    blocks = linearise_at(bench, place.nuisances, place.log_p_m, place.values)
-    priors = {name: (value, bench.effects[name].amplitudes[0].scale) for name, value in place.values.items()}
+    blocks = linearise_at(problem, place.nuisances, place.log_p_m, place.values)
+    priors = {
+        name: (value, problem.effects[name].amplitudes[0].scale) for name, value in place.values.items()
+    }
     step, covariance, _left, logdet, _weighted = solve_globals(blocks, ("ln_p_m", *place.values), priors)
     chi_square = sum(block.chi_square for block in blocks)
     points = sum(block.residual.size for block in blocks)
     log_likelihood = -0.5 * (chi_square + logdet + points * math.log(2 * math.pi))
-    height = log_likelihood - 0.5 * sum((away / width) ** 2 for away, width in priors.values())
-    return Solved(place, blocks, step, covariance, chi_square, points, log_likelihood, height)
+    log_posterior = log_likelihood - 0.5 * sum((away / width) ** 2 for away, width in priors.values())
+    return Solved(place, blocks, step, covariance, chi_square, points, log_likelihood, log_posterior)
 
 
-def settle_nuisances(bench: Workbench, here: Solved, most: int) -> Solved:
+def converge_nuisances(problem: Problem, here: Solved, most: int) -> Solved:
     """The same with the nuisances moved to their best there, ``most`` times; where that overshoots, half as far."""
     share, last = 1.0, math.inf
     for _ in range(most):
-        place, shift = _follow(bench, here, here.place.log_p_m, here.place.values)
+        place, shift = _follow(problem, here, here.place.log_p_m, here.place.values)
         if shift > OVERSHOOTS * last:
             share *= 0.5
         pairs = zip(here.place.nuisances, place.nuisances, strict=True)
         moved = tuple(before + share * (after - before) for before, after in pairs)
-        here, last = solve_at(bench, replace(place, nuisances=moved)), shift
+        here, last = solve_at(problem, replace(place, nuisances=moved)), shift
         if shift < CALM:
             break
     return here
 
 
-def advance(bench: Workbench, here: Solved, share: float) -> tuple[Place, bool]:
+def advance(problem: Problem, here: Solved, share: float) -> tuple[ParameterPoint, bool]:
     """The next place, a share of the step on, and whether it is as good as the last."""
     place = here.place
-    moved = share * _shorten(bench, stop_at_limits(bench, here)[0], place.values)
-    log_p_m = hold_strength(bench, place.log_p_m + float(np.clip(moved[0], -0.7, 0.7)))
+    moved = share * _shorten(problem, stop_at_limits(problem, here)[0], place.values)
+    log_p_m = hold_strength(problem, place.log_p_m + float(np.clip(moved[0], -0.7, 0.7)))
     apart = [abs(log_p_m - place.log_p_m) / math.sqrt(here.covariance[0, 0])]
     values: dict[str, float] = {}
     for k, (name, before) in enumerate(place.values.items(), start=1):
-        values[name] = hold(bench, name, before + float(moved[k]))
+        values[name] = hold(problem, name, before + float(moved[k]))
         apart.append(abs(values[name] - before) / math.sqrt(here.covariance[k, k]))
-    there, shift = _follow(bench, here, log_p_m, values)
+    there, shift = _follow(problem, here, log_p_m, values)
     return there, max(apart) < SETTLED and shift < CALM
 
 
-def _follow(bench: Workbench, here: Solved, log_p_m: float, values: dict[str, float]) -> tuple[Place, float]:
+def _follow(
+    problem: Problem, here: Solved, log_p_m: float, values: dict[str, float]
+) -> tuple[ParameterPoint, float]:
     """The place at other globals, its nuisances at what is best with them as seen from here, and how far these moved."""
     place = here.place
     taken = {"ln_p_m": log_p_m - place.log_p_m}
@@ -95,12 +99,12 @@ def _follow(bench: Workbench, here: Solved, log_p_m: float, values: dict[str, fl
     for block in here.blocks:
         change = sum(part * block.tangents[name] for name, part in taken.items())
         weighted.append(block.solve(block.residual - change))
-    nuisances, shift = move_nuisances(bench, place.nuisances, here.blocks, weighted)
-    return Place(log_p_m, values, nuisances), shift
+    nuisances, shift = move_nuisances(problem, place.nuisances, here.blocks, weighted)
+    return ParameterPoint(log_p_m, values, nuisances), shift
 
 
 def move_nuisances(
-    bench: Workbench,
+    problem: Problem,
     nuisances: Sequence[FloatArray],
     blocks: Sequence[Block],
     weighted: Sequence[FloatArray],
@@ -108,46 +112,48 @@ def move_nuisances(
     """Nuisances of every observation at their conditional best, and the largest move; weighted : as solve_globals gives."""
     followed = [
         observation.follow(own, block, left)
-        for observation, own, block, left in zip(bench.observations, nuisances, blocks, weighted, strict=True)
+        for observation, own, block, left in zip(
+            problem.observations, nuisances, blocks, weighted, strict=True
+        )
     ]
     return tuple(own for own, _ in followed), max(move for _, move in followed)
 
 
-def stop_at_limits(bench: Workbench, here: Solved) -> tuple[FloatArray, set[int]]:
+def stop_at_limits(problem: Problem, here: Solved) -> tuple[FloatArray, set[int]]:
     """The step with p_m and amplitudes stopped at their limits, the others at their best with them; and the places of those
     stopped."""
     step, stopped = here.step, set()
     wanted = here.place.log_p_m + float(step[0])
-    if (held := hold_strength(bench, wanted)) != wanted:
+    if (held := hold_strength(problem, wanted)) != wanted:
         step = step + here.covariance[0] / here.covariance[0, 0] * (held - wanted)
         stopped.add(0)
     for k, (name, value) in enumerate(here.place.values.items(), start=1):
-        parameter = bench.effects[name].amplitudes[0]
+        parameter = problem.effects[name].amplitudes[0]
         low, high = parameter.limits
         if not low <= parameter.null + value + step[k] <= high:
-            back = hold(bench, name, value + float(step[k])) - value - step[k]
+            back = hold(problem, name, value + float(step[k])) - value - step[k]
             step = step + here.covariance[k] / here.covariance[k, k] * back
             stopped.add(k)
     return step, stopped
 
 
-def hold_strength(bench: Workbench, log_p_m: float) -> float:
+def hold_strength(problem: Problem, log_p_m: float) -> float:
     """ln p_m, inside its range."""
-    low, high = (math.log(p) for p in bench.campaign.p_m_range)
+    low, high = (math.log(p) for p in problem.campaign.p_m_range)
     return min(max(log_p_m, low), high)
 
 
-def hold(bench: Workbench, name: str, amplitude: float) -> float:
+def hold(problem: Problem, name: str, amplitude: float) -> float:
     """An amplitude, inside the limits of its parameter."""
-    parameter = bench.effects[name].amplitudes[0]
+    parameter = problem.effects[name].amplitudes[0]
     return parameter.hold(amplitude) - parameter.null
 
 
-def _shorten(bench: Workbench, step: FloatArray, values: Mapping[str, float]) -> FloatArray:
+def _shorten(problem: Problem, step: FloatArray, values: Mapping[str, float]) -> FloatArray:
     """Shorten a step so that no amplitude moves by more than 1.5 of its own simulation steps at once."""
     factor = min(1.0, 0.7 / max(abs(float(step[0])), 1e-12))
     for moved, (name, value) in zip(step[1:], values.items(), strict=True):
-        parameter = bench.effects[name].amplitudes[0]
+        parameter = problem.effects[name].amplitudes[0]
         unit, here = abs(parameter.grade(parameter.step)), parameter.grade(value)
         further = math.copysign(1.5 * max(unit, abs(here)), moved)
         reach = abs(parameter.amplitude_at(here + further) - value)

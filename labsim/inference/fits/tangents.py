@@ -1,4 +1,4 @@
-"""All parts of the data about one point of the globals, by finite differences of what the workbench predicts there."""
+"""All parts of the data about one point of the globals, by finite differences of what the problem predicts there."""
 
 from __future__ import annotations
 
@@ -7,49 +7,51 @@ from functools import partial
 
 from ...records import FloatArray
 from ..observations import Observation
-from ..observations.drop_terms import Probe
-from ..workbench import Workbench
+from ..observations.linearised_drop import Perturbation
+from ..problem import Problem
 from .blocks import Block
 
-Blocks = tuple[Block, ...]  # one an observation, in the workbench's order
+Blocks = tuple[Block, ...]  # one an observation, in the problem's order
 
 
 def linearise_at(
-    bench: Workbench,
+    problem: Problem,
     nuisances: Sequence[FloatArray],
     log_p_m: float,
     values: Mapping[str, float],
     further: Sequence[str] = (),
 ) -> Blocks:
     """Every observation about a point. further : effects whose tangents at null are wanted too."""
-    probes = {}
+    perturbations = {}
     for name, amplitude in {**{name: 0.0 for name in further}, **values}.items():
-        parameter = bench.effects[name].amplitudes[0]
+        parameter = problem.effects[name].amplitudes[0]
         step = 0.05 * parameter.grade(parameter.step)
         here = parameter.grade(amplitude)
         low, high = parameter.limits
         if not low <= parameter.null + parameter.amplitude_at(here + step) <= high:
             step = -step
         step = parameter.amplitude_at(here + step) - amplitude
-        probes[name] = _stand(bench, {**values, name: amplitude + step}, step)
-    nominal = _stand(bench, values)
+        perturbations[name] = _stand(problem, {**values, name: amplitude + step}, step)
+    nominal = _stand(problem, values)
     return tuple(
-        each.linearise(own, log_p_m, nominal, bench.terms, probes)
-        for each, own in zip(bench.observations, nuisances, strict=True)
+        each.linearise(own, log_p_m, nominal, problem.budget, perturbations)
+        for each, own in zip(problem.observations, nuisances, strict=True)
     )
 
 
 def linearise_alone(
-    bench: Workbench, observation: Observation, values: Mapping[str, float], steps: Mapping[str, float]
+    problem: Problem, observation: Observation, values: Mapping[str, float], steps: Mapping[str, float]
 ) -> Block:
     """One observation that rests on no runs about amplitudes, with tangents by the given steps."""
-    probes = {
-        name: _stand(bench, {**values, name: values.get(name, 0.0) + step}, step)
+    perturbations = {
+        name: _stand(problem, {**values, name: values.get(name, 0.0) + step}, step)
         for name, step in steps.items()
     }
-    return observation.linearise(observation.begin(), 0.0, _stand(bench, values), bench.terms, probes)
+    return observation.linearise(
+        observation.begin(), 0.0, _stand(problem, values), problem.budget, perturbations
+    )
 
 
-def _stand(bench: Workbench, values: Mapping[str, float], step: float = 0.0) -> Probe:
-    setting = partial(bench.initial_setting, values)
-    return Probe(values, bench.instruments(values), bench.log_offsets(values), setting, step)
+def _stand(problem: Problem, values: Mapping[str, float], step: float = 0.0) -> Perturbation:
+    setting = partial(problem.initial_setting, values)
+    return Perturbation(values, problem.instruments(values), problem.log_offsets(values), setting, step)

@@ -13,7 +13,7 @@ from ...effects import Parameter
 from ...errors import InferenceError
 from ...records import FloatArray
 from ..observations.acceleration_model import AccelerationModel
-from ..workbench import Workbench
+from ..problem import Problem
 from .blocks import whiten_all
 from .fitting import Fit
 from .posterior import QuadraticResidual, measure_residual
@@ -54,29 +54,29 @@ class Target:
         return np.exp(values) if k == 0 else self.nulls[k - 1] + values
 
 
-def make_target(bench: Workbench, fit: Fit) -> Target:
+def make_target(problem: Problem, fit: Fit) -> Target:
     """Flat prior in ln p_m, the effects' own priors, the covariance of the fit."""
-    parameters = tuple(bench.effects[name].amplitudes[0] for name in fit.hypothesis)
+    parameters = tuple(problem.effects[name].amplitudes[0] for name in fit.hypothesis)
     names = (
-        name_column(bench.campaign.material.law),
+        name_column(problem.campaign.material.law),
         *(f"{n}.{p.name}" for n, p in zip(fit.hypothesis, parameters, strict=True)),
     )
     centre = np.array([fit.log_p_m, *(fit.values[name] for name in fit.hypothesis)])
 
     def miss(theta: FloatArray) -> FloatArray:
         values = dict(zip(fit.hypothesis, theta[1:], strict=True))
-        blocks = linearise_at(bench, fit.nuisances, float(theta[0]), values)
+        blocks = linearise_at(problem, fit.nuisances, float(theta[0]), values)
         return np.concatenate(
             [fitted.whiten(block.residual) for fitted, block in zip(fit.blocks, blocks, strict=True)]
         )
 
-    bounds = [[math.log(p) for p in bench.campaign.p_m_range]]
+    bounds = [[math.log(p) for p in problem.campaign.p_m_range]]
     bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
     nulls = tuple(parameter.null for parameter in parameters)
     at_end = any(math.isclose(fit.log_p_m, end, abs_tol=1e-9) for end in bounds[0])
     # accelerations of runs at two p_m differ by the noise of their particles too, which a secant takes for what p_m changes and
     # the solver's error of p_m, which lies along the tangent at the fit, does not cover
-    if any(isinstance(model, AccelerationModel) for model in bench.tracks.models):
+    if any(isinstance(model, AccelerationModel) for model in problem.tracks.models):
         white = whiten_all(fit.blocks, ["ln_p_m", *fit.hypothesis])
         misfit = measure_residual(
             lambda theta: white[:, 0] - white[:, 1:] @ (theta - centre), centre, fit.covariance
@@ -86,7 +86,7 @@ def make_target(bench: Workbench, fit: Fit) -> Target:
     return Target(names, nulls, parameters, misfit, np.array(bounds))
 
 
-def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[float, float]:
+def integrate_evidence(problem: Problem, fit: Fit, *, seed: int = 1) -> tuple[float, float]:
     """ln of the integrated likelihood by nested sampling, and its error: what Laplace's formula in Fit.evidence is checked by.
 
     Needs dynesty (the extra ``evidence``); Speagle (2020), MNRAS 493, 3132.
@@ -95,7 +95,7 @@ def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[fl
         import dynesty
     except ImportError:
         raise InferenceError("", "dynesty", 'is not installed; pip install "labsim[evidence]"') from None
-    target = make_target(bench, fit)
+    target = make_target(problem, fit)
     low, high = target.bounds[0]
     cut = [tuple(float(p.prior.cdf(limit)) for limit in p.limits) for p in target.parameters]
 
@@ -116,5 +116,5 @@ def integrate_evidence(bench: Workbench, fit: Fit, *, seed: int = 1) -> tuple[fl
     points = sum(block.residual.size for block in fit.blocks)
     determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.blocks)
     constant = -0.5 * (determinant + points * math.log(2 * math.pi))
-    price = sum(bench.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
+    price = sum(problem.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
     return float(sampler.results.logz[-1]) + constant + price, float(sampler.results.logzerr[-1])

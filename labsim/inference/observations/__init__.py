@@ -27,15 +27,15 @@ from ...records import Campaign, FloatArray
 from ...sph.plugins import load_module
 from ..emulation.forward import ResponseTable
 from ..fits.blocks import Block
-from .drop_terms import Probe, Terms
+from .linearised_drop import ErrorBudget, Perturbation
 
 
 @dataclass(frozen=True)
 class RunFeatures:
-    """Runs of one family, (number ``family``), as an observation takes them. encode : the part of a run that it reads -> (m,)
+    """Runs of one group, (number ``group``), as an observation takes them. encode : the part of a run that it reads -> (m,)
     features, smooth in ln speed and ln p_m; table : what keeps and interpolates them."""
 
-    family: int
+    group: int
     table: ResponseTable
     encode: Callable[[Any], FloatArray]
 
@@ -62,12 +62,12 @@ class Observation(Protocol):
         self,
         nuisances: FloatArray,
         log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
     ) -> Block:
-        """Residual, covariance and tangents about the point ``nominal``; probes : name of a global -> the point after a step of
-        it, for its tangent by finite differences."""
+        """Residual, covariance and tangents about the point ``nominal``; perturbations : name of a global -> the point after
+        a step of it, for its tangent by finite differences."""
 
     def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
         """Nuisances at their best as seen from ``block``, and the largest move (1 is a prior width or a frame).
@@ -93,26 +93,26 @@ class Direct(WithoutNuisances, ABC):
     features: Sequence[RunFeatures] = ()
 
     @abstractmethod
-    def expect(self, log_p_m: float, point: Probe) -> FloatArray:
+    def expect(self, log_p_m: float, point: Perturbation) -> FloatArray:
         """What a true model gives at a point, (n,)."""
 
     @abstractmethod
-    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
+    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], budget: ErrorBudget) -> Block:
         """The data with their errors about what is expected."""
 
     def linearise(
         self,
         nuisances: FloatArray,
         log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
     ) -> Block:
         here = self.expect(log_p_m, nominal)
         tangents = {"ln_p_m": (self.expect(log_p_m + 1e-3, nominal) - here) / 1e-3}
-        for name, point in probes.items():
+        for name, point in perturbations.items():
             tangents[name] = (self.expect(log_p_m, point) - here) / point.step
-        return self.compare(here, tangents, terms)
+        return self.compare(here, tangents, budget)
 
 
 def list_own_files(folder: Path) -> list[Path]:

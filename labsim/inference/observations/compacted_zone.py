@@ -26,7 +26,7 @@ from ...sph import DropRun
 from ..emulation.forward import ResponseTable
 from ..fits.blocks import Block, lay_out
 from . import RunFeatures
-from .drop_terms import Probe, Terms, measure_distances
+from .linearised_drop import ErrorBudget, Perturbation, measure_distances
 from .undisturbed import GREY, observe_undisturbed
 
 LIFT = 60e-6  # m, of the bead at rest over its lowest point
@@ -136,7 +136,7 @@ def encode_scan_run(run: DropRun | Compaction, observed: ObservedScan) -> FloatA
 
 
 @dataclass(frozen=True)
-class ZoneTerms:
+class LinearisedZone:
     """One scan about one point. residual : (n + 1,) of the cells and the tip's depth; own : (n + 1, n + 1) covariance of what no
     other scan shares; tangents : name -> (n + 1,); speed : (n + 1,) per standard uncertainty of the stated speed; grey : (n + 1,)
     what its error changes; solver : (n + 1, errors) those of the solver that go through the whole zone; contrast : (n,) |φ - φ0|;
@@ -174,8 +174,13 @@ class CompactedZone:
         return speed.sigma / speed.value
 
     def linearise(
-        self, log_speed: float, log_p_m: float, nominal: Probe, terms: Terms, probes: Mapping[str, Probe]
-    ) -> ZoneTerms:
+        self,
+        log_speed: float,
+        log_p_m: float,
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
+    ) -> LinearisedZone:
         """Residual, errors and tangents."""
         observed = self.observed
         found = observed.reduced.map
@@ -202,7 +207,7 @@ class CompactedZone:
         by_strength = (predict(log_p_m + 0.02, log_speed) - here) / 0.02
         local = [
             by_speed,
-            by_strength * terms.scatter,
+            by_strength * budget.scatter,
             np.append(_slope_along_z(observed, here[:n]), -1.0) * LIFT,
         ]
         own = np.zeros((n + 1, n + 1))
@@ -214,15 +219,15 @@ class CompactedZone:
             by_strength * STRENGTH,
             np.append((here[:n] - observed.beside) * CONTRAST, 0.0),
             np.append(reach, 0.0),
-            np.append(changed * terms.zone_change, 0.0),
+            np.append(changed * budget.zone_change, 0.0),
             np.append(np.zeros(n), NUMERICAL_DEPTH * here[n]),
         ]
         tangents = {"ln_p_m": by_strength}
-        for name, point in probes.items():
+        for name, point in perturbations.items():
             moved = see(response.code(point.amplitudes), point.instruments[observed.name])
             tangents[name] = (moved - here) / point.step
         pull = (log_speed - math.log(observed.scan.speed.value)) / self.spread
-        return ZoneTerms(
+        return LinearisedZone(
             data - here + by_speed * pull,  # the speed is zero-mean about what is stated
             own,
             tangents,
@@ -263,12 +268,12 @@ class CompactedZones:
         self,
         nuisances: FloatArray,
         log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
     ) -> Block:
         parts = [
-            zone.linearise(float(log_speed), log_p_m, nominal, terms, probes)
+            zone.linearise(float(log_speed), log_p_m, nominal, budget, perturbations)
             for zone, log_speed in zip(self.zones, nuisances, strict=True)
         ]
         sections = lay_out(part.residual.size for part in parts)
@@ -297,13 +302,16 @@ class CompactedZones:
         return Block(
             np.concatenate([part.residual for part in parts]),
             covariance,
-            {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
+            {
+                name: np.concatenate([part.tangents[name] for part in parts])
+                for name in ("ln_p_m", *perturbations)
+            },
             free,
             speeds,
             {zone.name: section for zone, section in zip(self.zones, sections, strict=True)},
         )
 
-    def _find_alike(self, parts: Sequence[ZoneTerms]) -> FloatArray:
+    def _find_alike(self, parts: Sequence[LinearisedZone]) -> FloatArray:
         """(scans, scans) correlations of the solver's errors."""
         drops = []
         for zone, part in zip(self.zones, parts, strict=True):

@@ -24,7 +24,7 @@ from ...runs.parts import Push
 from ...sph import DropRun
 from ..fits.blocks import Block, add_errors, lay_out
 from . import RunFeatures, WithoutNuisances
-from .drop_terms import Probe, Terms
+from .linearised_drop import ErrorBudget, Perturbation
 from .observe_push import ObservedPush
 
 SOLVER = 0.20  # of the simulated ratio: spacing, a shaft shorter than a sleeve (benchmarks/solver/sleeve.py)
@@ -92,7 +92,7 @@ class TipSleeves:
     spread: Spread
 
     def predict(
-        self, push: ObservedPush, log_p_m: float, point: Probe, amplitudes: Mapping[str, float]
+        self, push: ObservedPush, log_p_m: float, point: Perturbation, amplitudes: Mapping[str, float]
     ) -> FloatArray:
         """The ratio that the gauges of one record should read, (windows,)."""
         at = log_p_m + point.log_offsets.get(push.name, 0.0)
@@ -101,16 +101,16 @@ class TipSleeves:
         read = self._instrument(point, push).stated_resistance(measured, push.depth, push.impact_speed)
         return code[0] * measured / np.maximum(read, 0.01 * measured)
 
-    def _instrument(self, point: Probe, push: ObservedPush) -> Instrument:
+    def _instrument(self, point: Perturbation, push: ObservedPush) -> Instrument:
         return point.instruments[push.name]
 
     def linearise(
         self,
         push: ObservedPush,
         log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
     ) -> SleevePart:
         """Residual, errors and tangents of one record, in the windows that have a sleeve."""
         gauge, radius = push.drop.gauge, push.drop.projectile.tip_radius
@@ -119,11 +119,11 @@ class TipSleeves:
         ratio, net = push.friction_ratio[seen], np.exp(push.resistance[seen])
         here = self.predict(push, log_p_m, nominal, nominal.amplitudes)[seen]
 
-        def move(log_step: float, point: Probe) -> FloatArray:
+        def move(log_step: float, point: Perturbation) -> FloatArray:
             return self.predict(push, log_p_m + log_step, point, point.amplitudes)[seen] - here
 
         tangents = {"ln_p_m": move(1e-2, nominal) / 1e-2}
-        for name, point in probes.items():
+        for name, point in perturbations.items():
             tangents[name] = move(0.0, point) / point.step
         # the same size in all of them: where errors go with single data, low ones would count for more
         size = np.full(ratio.size, self.spread.level)
@@ -141,7 +141,7 @@ class TipSleeves:
             gauge.sleeve.offset_sigma / net,
             -offset * size / net,
             spread.records * size,
-            tangents["ln_p_m"] * terms.scatter,
+            tangents["ln_p_m"] * budget.scatter,
         )
         white = push.friction_sigma[seen] ** 2 + (spread.rest * size) ** 2
         return SleevePart(ratio - here, white, tangents, shared, np.stack(local, axis=1))
@@ -177,15 +177,20 @@ class SleeveFriction(WithoutNuisances):
         self,
         nuisances: FloatArray,
         log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
     ) -> Block:
-        parts = [sleeve.linearise(push, log_p_m, nominal, terms, probes) for sleeve, push in self._rows]
+        parts = [
+            sleeve.linearise(push, log_p_m, nominal, budget, perturbations) for sleeve, push in self._rows
+        ]
         covariance = np.zeros((self.data.size, self.data.size))
         add_errors(covariance, parts, lay_out(part.residual.size for part in parts))
         return Block(
             np.concatenate([part.residual for part in parts]),
             covariance,
-            {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
+            {
+                name: np.concatenate([part.tangents[name] for part in parts])
+                for name in ("ln_p_m", *perturbations)
+            },
         )

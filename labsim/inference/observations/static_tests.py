@@ -21,7 +21,7 @@ from ...records import Campaign, FloatArray, Material, StrengthTest
 from ...sph.sirono import compressive_strength, tensile_strength
 from ..fits.blocks import Block
 from . import Direct
-from .drop_terms import Probe, Terms
+from .linearised_drop import ErrorBudget, Perturbation
 
 PARAMETERS = {  # of each kind's own curve, with units
     "compression_omnidirectional": (("p_m", "Pa"), ("phi_1", "1"), ("phi_2", "1"), ("delta", "1")),
@@ -156,7 +156,7 @@ class StaticTests(Direct):
     kind: str = "static tests"
     name: str = "static tests"
 
-    def expect(self, log_p_m: float, point: Probe) -> FloatArray:
+    def expect(self, log_p_m: float, point: Perturbation) -> FloatArray:
         """ln of the stresses in Pa by the law."""
         setting = point.setting("static test")
         factor = next(iter(point.instruments.values())).static_factor
@@ -177,10 +177,10 @@ class StaticTests(Direct):
             expected.append(curves[test.kind])
         return np.concatenate(expected)
 
-    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
+    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], budget: ErrorBudget) -> Block:
         # strength of tension does not follow p_m, of shear half; all samples scatter alike
         shares = [0.5 if test.kind == "shear" else 1.0 for test in self.tests]
-        _, stress, lower = _stack(self.tests, shares, terms.scatter)
+        _, stress, lower = _stack(self.tests, shares, budget.scatter)
         return Block(np.log(stress) - expected, lower @ lower.T, tangents)
 
 

@@ -5,7 +5,7 @@
         surface row (stated), pixel and frame scale (stated or SCALE_SIGMA), sample scatter of ln p_m and stated mass error
         (a random ln p_m per drop), numerical error of the solver (smooth over fraction of the stop, depth and size).
 
-Nuisances enter linearly about their current best values and are integrated out. Each term has a switch in Terms. Formulas:
+Nuisances enter linearly about their current best values and are integrated out. Each term has a switch in ErrorBudget. Formulas:
 docs/likelihood-errors.md.
 """
 
@@ -21,11 +21,11 @@ from ..emulation.forward import Instant
 from ..fits.blocks import Block, add_errors, lay_out
 from . import RunFeatures
 from .drop_model import REACH, WIDTHS
-from .drop_terms import (
+from .linearised_drop import (
+    ErrorBudget,
     NumericalError,
-    Probe,
+    Perturbation,
     RecordModel,
-    Terms,
     linearise_drop,
     measure_distances,
 )
@@ -69,9 +69,9 @@ class Tracks:
         self,
         nuisances: FloatArray,
         log_p_m: float,
-        nominal: Probe,
-        terms: Terms,
-        probes: Mapping[str, Probe],
+        nominal: Perturbation,
+        budget: ErrorBudget,
+        perturbations: Mapping[str, Perturbation],
     ) -> DropsBlock:
         samples = self.samples
         parts = [
@@ -80,8 +80,8 @@ class Tracks:
                 instant,
                 log_p_m,
                 nominal,
-                terms,
-                probes,
+                budget,
+                perturbations,
                 with_others=len(samples[model.observed.drop.sample]) > 1,
             )
             for model, instant in zip(self.models, self.instants(nuisances), strict=True)
@@ -93,7 +93,10 @@ class Tracks:
         return DropsBlock(
             np.concatenate([part.residual for part in parts]),
             covariance,
-            {name: np.concatenate([part.tangents[name] for part in parts]) for name in ("ln_p_m", *probes)},
+            {
+                name: np.concatenate([part.tangents[name] for part in parts])
+                for name in ("ln_p_m", *perturbations)
+            },
             sections=sections,
             local=tuple(part.local for part in parts),
         )
@@ -111,7 +114,7 @@ class Tracks:
 
 
 def numerical_covariance(parts: Sequence[NumericalError]) -> FloatArray:
-    """The solver's error of the depth: as large as terms.numerical of the depth reached, alike for alike drops."""
+    """The solver's error of the depth: as large as budget.numerical of the depth reached, alike for alike drops."""
     size = np.concatenate([part.size for part in parts])
     fraction = np.concatenate([part.fraction / part.length for part in parts])
     counts = [part.size.size for part in parts]

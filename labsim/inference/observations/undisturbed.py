@@ -20,7 +20,7 @@ from ...records import FloatArray, Scan
 from ...sph.particles import initial_filling_factor
 from ..fits.blocks import Block
 from . import Direct
-from .drop_terms import Probe, Terms
+from .linearised_drop import ErrorBudget, Perturbation
 
 REACH = 3.0  # tip radii about the bead and its path within which dust may have moved
 SMOOTH, SMOOTH_LENGTH = 3e-4, 3e-4  # of the filling factor; m
@@ -77,7 +77,7 @@ class Layering(Direct):
     kind: str = "undisturbed dust"
     name: str = "undisturbed dust"
 
-    def expect(self, log_p_m: float, point: Probe) -> FloatArray:
+    def expect(self, log_p_m: float, point: Perturbation) -> FloatArray:
         parts = []
         for each in self.dust:
             instrument = point.instruments[each.name]
@@ -86,7 +86,7 @@ class Layering(Direct):
             parts.append(np.append(instrument.stated_filling_factor(filling_factor), math.log(spread)))
         return np.concatenate(parts)
 
-    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], terms: Terms) -> Block:
+    def compare(self, expected: FloatArray, tangents: Mapping[str, FloatArray], budget: ErrorBudget) -> Block:
         dust = self.dust
         data = np.concatenate([np.append(each.filling_factor, math.log(each.point_spread)) for each in dust])
         row = np.concatenate([np.append(np.ones(each.depth.size), 0.0) for each in dust])

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from ...records import FloatArray
-from .look import BLUE, GREY, INK, PHI
+from .style import BLUE, GREY, INK, PHI
 
 
 def plot_depth(curve: pd.DataFrame, ax: Axes | None = None) -> Axes:

@@ -17,12 +17,12 @@ from matplotlib.patches import Circle
 from ...diagnosis.campaign import Diagnosis
 from ...inference.fits.fitting import Fit
 from ...inference.fits.posterior import Posterior
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import FloatArray
 from ..pages.drop_views import DropView
 from ..pages.map_views import MapView
-from .look import BLUE, COLOURS, GREY, INK, ORANGE, PHI, corner_side, new_figure
 from .strengths import find_tests
+from .style import BLUE, COLOURS, GREY, INK, ORANGE, PHI, corner_side, new_figure
 
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
@@ -81,7 +81,7 @@ def lay_drops(views: Sequence[DropView], figure: Figure) -> list[tuple[Axes, Axe
 
 
 def choose_decisive(
-    bench: Workbench,
+    problem: Problem,
     views: Sequence[DropView],
     folder: Path,
     cause: Sequence[str],
@@ -90,10 +90,10 @@ def choose_decisive(
     """Name and caption of the picture beside a verdict: of the undisturbed dust where the cause is one of the sample and a scan
     shows it, of the static tests where the fits part more in them than in the drops, else of the drop in which the models part
     most (of one model the deepest), which is drawn."""
-    kinds = {bench.effects[name].kind for name in cause if name in bench.effects}
-    if kinds == {"sample"} and bench.undisturbed:
+    kinds = {problem.effects[name].kind for name in cause if name in problem.effects}
+    if kinds == {"sample"} and problem.undisturbed:
         return "undisturbed", "Undisturbed dust: its filling factor against depth, as the scans show it."
-    _, of_tests = find_tests(bench, fits[:2])
+    _, of_tests = find_tests(problem, fits[:2])
     if len(of_tests) > 1:
         in_tests, in_drops = (
             one.chi_square - other.chi_square for one, other in (of_tests, [fit.drops for _, fit in fits[:2]])
@@ -280,15 +280,15 @@ def draw_p_m(
     return path
 
 
-def draw_undisturbed(bench: Workbench, path: Path) -> Path:
+def draw_undisturbed(problem: Problem, path: Path) -> Path:
     """Filling factor of dust that no bead reached, against depth, and what is stated of the sample."""
-    sample = bench.campaign.sample
+    sample = problem.campaign.sample
     with new_figure(path, 6.4, 3.2) as figure:
         ax = figure.subplots()
         two = 2 * sample.filling_factor_sigma
         low, high = sample.filling_factor - two, sample.filling_factor + two
         ax.axhspan(low, high, color=GREY, alpha=0.25, lw=0, label="stated, 2σ")
-        for dust, color in zip(bench.undisturbed, (BLUE, ORANGE, INK, GREY) * 20, strict=False):
+        for dust, color in zip(problem.undisturbed, (BLUE, ORANGE, INK, GREY) * 20, strict=False):
             ax.errorbar(
                 dust.depth * 1e3,
                 dust.filling_factor,

@@ -16,7 +16,7 @@ from ...records import FloatArray
 from ..pages.drop_views import DropView
 from ..pages.map_views import MapView
 from .campaign import DIFFERENCE, say_projectile
-from .look import PHI
+from .style import PHI
 
 ROLES = ("nominal", "extended")
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "star", "cross", "x")

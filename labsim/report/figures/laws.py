@@ -11,7 +11,7 @@ from ...diagnosis.unlisted.free_law import RecoveredLaw
 from ...diagnosis.unlisted.learned_law import Formula, shape_at
 from ...records import FloatArray
 from .interactive import MARGIN, Spec
-from .look import BLUE, INK, ORANGE, new_figure
+from .style import BLUE, INK, ORANGE, new_figure
 
 POINTS = 121
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from ...records import CompressedVolume, FillingMap, FloatArray
-from .look import PHI, new_figure
+from .style import PHI, new_figure
 
 
 def draw_map(scan_map: FillingMap, undisturbed: float, path: Path, title: str = "") -> Path:

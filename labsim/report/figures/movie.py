@@ -15,8 +15,8 @@ from ...records import FloatArray
 from ...sph import DropRun, particles
 from ...sph.drop import evolve, start_body
 from ...video.overlay import write_movie
-from .look import STYLE
 from .runs import fill_density_field
+from .style import STYLE
 
 PICTURES = 60
 

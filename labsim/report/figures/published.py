@@ -13,7 +13,7 @@ from ...diagnosis.published.scan import compacted_area
 from ...inference.published.calibrate import SummaryCalibration
 from ...inference.published.figures import impact_speed
 from ...inference.published.planar import expected_raw_depth, round_depth
-from .look import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, corner_side, new_figure
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, corner_side, new_figure
 
 
 def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:

@@ -13,7 +13,7 @@ from ...sph import DropRun, DropSetting
 from ...sph.profile import outline
 from ...sph.setting import base_area, say_material, say_motion, say_projectile
 from ...sph.tips import make_profile
-from .look import BLUE, GREY, INK, PHI, new_figure
+from .style import BLUE, GREY, INK, PHI, new_figure
 
 
 def draw_run(run: DropRun, path: Path) -> Path:

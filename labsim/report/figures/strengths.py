@@ -10,10 +10,10 @@ import numpy as np
 from ...inference.fits.blocks import Block
 from ...inference.fits.fitting import Fit
 from ...inference.observations.static_tests import StaticTests, StrengthFit
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import Campaign
 from ...sph.sirono import compressive_strength
-from .look import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
+from .style import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
 
 LOOKS = {
     "compression_omnidirectional": ("compression from all sides", BLUE, "o"),
@@ -60,9 +60,9 @@ def draw_strength(
     return path
 
 
-def draw_tests(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) -> Path:
+def draw_tests(problem: Problem, fits: Sequence[tuple[str, Fit]], path: Path) -> Path:
     """Static tests beside the drops, a panel a test: stress against filling factor, measured and by the law of each fit."""
-    tests, blocks = find_tests(bench, fits)
+    tests, blocks = find_tests(problem, fits)
     assert tests is not None
     with new_figure(path, 3.4 * len(tests.tests) + 0.6, 3.2) as figure:
         panels = figure.subplots(1, len(tests.tests), squeeze=False)[0]
@@ -82,10 +82,10 @@ def draw_tests(bench: Workbench, fits: Sequence[tuple[str, Fit]], path: Path) ->
     return path
 
 
-def find_tests(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> tuple[StaticTests | None, list[Block]]:
+def find_tests(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> tuple[StaticTests | None, list[Block]]:
     """The static tests that drops are compared with, none where there are none, and what each fit says of them: its residuals are
     ln of measured over the law's."""
-    for k, observation in enumerate(bench.observations):
+    for k, observation in enumerate(problem.observations):
         if isinstance(observation, StaticTests):
             return observation, [fit.blocks[k] for _, fit in fits]
     return None, []

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...records import Camera, DecelerationCurve, FloatArray, Track
-from .look import BLUE, GREEN, GREY, INK, ORANGE, new_figure
+from .style import BLUE, GREEN, GREY, INK, ORANGE, new_figure
 
 
 def draw_track(

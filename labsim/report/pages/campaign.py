@@ -11,7 +11,7 @@ from ...diagnosis.next_experiment import Suggestion
 from ...inference.calibrate import Calibration
 from ...inference.fits.fitting import DOUBTFUL, Fit
 from ...inference.fits.posterior import Posterior
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import Campaign
 from ..campaign_tables import say_verdict
 from ..figures.campaign import choose_decisive
@@ -87,7 +87,7 @@ def write_campaign_page(
             middle, spread = quantiles["over_causes"]["q50"] / 1e3, _between(quantiles["over_causes"])
             tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
         tiles.append(tile_gain(found.gain, "drops"))
-    figures = _figures(found.bench, views, maps, posteriors)
+    figures = _figures(found.problem, views, maps, posteriors)
     held = [(labels[0], found.held_out_nominal.rms)]
     if len(labels) > 1:
         held.append((labels[1], found.held_out_extended.rms))
@@ -99,7 +99,7 @@ def write_campaign_page(
     return _write(
         folder,
         found.campaign,
-        found.bench,
+        found.problem,
         views,
         maps,
         figures,
@@ -109,7 +109,7 @@ def write_campaign_page(
         sentence=f"{say_verdict(found)} {summary['remedy']}",
         tiles=tiles,
         calibration=describe_calibration(
-            found.nominal, found.p_value, found.scatter, posteriors, found.bench, len(views)
+            found.nominal, found.p_value, found.scatter, posteriors, found.problem, len(views)
         ),
         diagnosed=True,
         cause=found.verdict.probabilities[0][0],
@@ -120,7 +120,7 @@ def write_campaign_page(
         untestable=describe_untestable(found),
         gain=describe_gain(found, summary, labels),
         suggestions=suggestions,
-        numerics=describe_numerics(summary["numerical_error"], found.bench),
+        numerics=describe_numerics(summary["numerical_error"], found.problem),
         warnings=found.warnings,
         runs=(found.runs_new, found.runs_reused, found.wall),
     )
@@ -157,10 +157,10 @@ def write_calibration_page(
     return _write(
         folder,
         found.campaign,
-        found.bench,
+        found.problem,
         views,
         maps,
-        _figures(found.bench, views, maps, posteriors),
+        _figures(found.problem, views, maps, posteriors),
         page_title="calibration",
         tone="none" if explains else "unknown",
         badge="Calibrated" if explains else "Calibrated, but the model does not explain the data",
@@ -171,11 +171,11 @@ def write_calibration_page(
             found.p_value,
             found.scatter,
             posteriors,
-            found.bench,
+            found.problem,
             len(views),
         ),
         diagnosed=False,
-        numerics=describe_numerics(numerical_error, found.bench),
+        numerics=describe_numerics(numerical_error, found.problem),
         warnings=found.warnings,
         runs=(found.runs_new, found.runs_reused, found.wall),
     )
@@ -186,7 +186,7 @@ def _between(q: dict[str, float]) -> str:
 
 
 def _figures(
-    bench: Workbench,
+    problem: Problem,
     views: Sequence[DropView],
     maps: Sequence[MapView],
     posteriors: Sequence[tuple[str, Posterior]],
@@ -199,9 +199,9 @@ def _figures(
         for q, name in enumerate(each.simulated):
             figures[f"map{k}_simulated{q}"] = plot_map(each, each.simulated[name])
             figures[f"map{k}_left{q}"] = plot_map(each, each.left(name), difference=True)
-    if bench.undisturbed:
-        sample = bench.campaign.sample
-        profiles = [(dust.name, dust.depth, dust.filling_factor, dust.sigma) for dust in bench.undisturbed]
+    if problem.undisturbed:
+        sample = problem.campaign.sample
+        profiles = [(dust.name, dust.depth, dust.filling_factor, dust.sigma) for dust in problem.undisturbed]
         figures["undisturbed"] = plot_undisturbed(
             profiles, (sample.filling_factor, sample.filling_factor_sigma)
         )
@@ -211,7 +211,7 @@ def _figures(
 def _write(
     folder: Path,
     campaign: Campaign,
-    bench: Workbench,
+    problem: Problem,
     views: Sequence[DropView],
     maps: Sequence[MapView],
     figures: dict[str, Any],
@@ -241,7 +241,7 @@ def _write(
         contents.insert(3, ("tests", "Static tests"))
     contents += [("numerics", "Numerical error"), ("warnings", "Warnings"), ("made", "Versions and hashes")]
     notes = {"drops": str(len(views)), "warnings": str(len(warnings)) if warnings else ""}
-    shown, decisive = choose_decisive(bench, views, folder, cause, fits)
+    shown, decisive = choose_decisive(problem, views, folder, cause, fits)
     pictures = {name: read_picture(folder / f"{name}.png", text) for name, text in PICTURES.items()}
     return write_html(
         folder / "report.html",
@@ -251,9 +251,9 @@ def _write(
         description=campaign.description,
         labels=list(views[0].simulated),
         contents=[(anchor, title, notes.get(anchor, "")) for anchor, title in contents],
-        measurement=describe_measurement(campaign, bench, views),
+        measurement=describe_measurement(campaign, problem, views),
         misfit=describe_misfit(views),
-        maps=describe_maps(campaign, bench, maps) if campaign.scans else None,
+        maps=describe_maps(campaign, problem, maps) if campaign.scans else None,
         pictures=pictures | {"decisive": pictures[shown]},
         decisive=decisive,
         diagnosed=diagnosed,

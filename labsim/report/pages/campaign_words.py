@@ -12,8 +12,8 @@ from ...inference.fits.posterior import Posterior
 from ...inference.observations.observe import Observed, ObservedDrop
 from ...inference.observations.observe_acceleration import ObservedImpact
 from ...inference.observations.observe_push import ObservedPush
+from ...inference.problem import Problem
 from ...inference.scatter import ScatterEstimate
-from ...inference.workbench import Workbench
 from ...records import Campaign, Drop
 from ..figures.campaign import say_projectile
 from ..figures.interactive import SIGNS
@@ -22,18 +22,18 @@ from .page import show_number
 from .phrases import add_article, list_names, say_count, say_range, shown_unit, state_p_value
 
 
-def describe_measurement(campaign: Campaign, bench: Workbench, views: Sequence[DropView]) -> dict[str, Any]:
+def describe_measurement(campaign: Campaign, problem: Problem, views: Sequence[DropView]) -> dict[str, Any]:
     sample = campaign.sample
     tests = f", {say_count(len(campaign.strength_tests), 'static test')}" if campaign.strength_tests else ""
     words = (
-        f"{say_count(len(bench.tracks.samples), 'drop')} with {_say_records(bench.drops)}, "
+        f"{say_count(len(problem.tracks.samples), 'drop')} with {_say_records(problem.drops)}, "
         f"{say_count(len(campaign.scans), 'CT scan')}{tests}, "
         f"into dust of filling factor {sample.filling_factor:g} ± {sample.filling_factor_sigma:g}, "
         f"{sample.diameter * 1e3:g} mm wide and {sample.depth * 1e3:g} mm deep, in gas of {sample.gas_pressure:g} Pa. "
         f"The nominal simulation is {campaign.geometry}, with gravity of {campaign.gravity:g} m/s²."
     )
     groups: dict[tuple, list[DropView]] = {}
-    drops = {model.observed.name: model.observed for model in bench.tracks.models}
+    drops = {model.observed.name: model.observed for model in problem.tracks.models}
     for view in views:
         camera = drops[view.name].drop.camera
         key = (say_projectile(view), camera and camera.frame_rate, camera and camera.pixel_size)
@@ -79,12 +79,12 @@ def describe_calibration(
     p_value: float,
     scatter: ScatterEstimate,
     posteriors: Sequence[tuple[str, Posterior]],
-    bench: Workbench,
+    problem: Problem,
     drops: int,
 ) -> dict[str, Any]:
     """fit: the one whose p_value this is; posteriors: (name of the model, posterior)."""
     first = posteriors[0][1]
-    filmed = any(isinstance(each, ObservedDrop) for each in bench.drops)
+    filmed = any(isinstance(each, ObservedDrop) for each in problem.drops)
     free_fall = "free fall averaged over eight frames; " if filmed else ""
     words = (
         "p_m says how hard the dust is to compress: its compressive strength is Σ = p_m ((φ − φ₁)/(φ₂ − φ))^(Δ ln 10). "
@@ -95,7 +95,7 @@ def describe_calibration(
     if drops > 1:
         words += (
             f"From drop to drop p_m scatters by {100 * scatter.mean:.1f} ± {100 * scatter.sd:.1f} %; the likelihood allows "
-            f"{100 * bench.terms.scatter:.2g} %. "
+            f"{100 * problem.budget.scatter:.2g} %. "
         )
     words += f"The sampling is converged: R-hat {first.r_hat:.3f}, {first.ess:.0f} independent samples."
     if not first.r_hat < 1.05:
@@ -107,7 +107,7 @@ def describe_calibration(
                 label, factor, unit = "p_m", 1e-3, "kPa"
             else:
                 effect, parameter = name.split(".", 1)
-                factor, unit = shown_unit(bench.effects[effect].parameter(parameter))
+                factor, unit = shown_unit(problem.effects[effect].parameter(parameter))
                 label = name
             low, middle, high = np.quantile(posterior.samples(name), [0.05, 0.5, 0.95]) * factor
             digits = "{:.3f}" if label == "p_m" else "{:.4g}"
@@ -175,14 +175,14 @@ def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
     return {"words": words, "rows": rows, "text": text, "symbols": list(zip(SIGNS * 9, kinds, strict=False))}
 
 
-def describe_numerics(error: dict[str, float], bench: Workbench) -> str:
+def describe_numerics(error: dict[str, float], problem: Problem) -> str:
     return (
         f"The particles of the simulation lie {error['spacing_m'] * 1e6:.3g} µm apart under the smallest tip, in proportion "
         f"under larger ones. So the simulated depth is right to {100 * error['depth_relative']:.2g} % rms, measured against an "
-        f"independent solver. The likelihood allows {100 * bench.terms.numerical:.2g} % of the depth for it "
-        f"and {100 * bench.terms.numerical_change:.2g} % of what an effect changes of it, alike for like drops; in all drops "
-        f"together {100 * bench.terms.numerical_slope:.2g} % for every factor of 2.7 in depth over tip radius, "
-        f"{100 * bench.terms.numerical_strength:.2g} % of p_m, and a contact that is off by "
-        f"{100 * bench.terms.contact_offset:.2g} % of the tip radius. p_m is told wider by "
-        f"{100 * bench.terms.other_codes:.2g} %, for other codes differ by more."
+        f"independent solver. The likelihood allows {100 * problem.budget.numerical:.2g} % of the depth for it "
+        f"and {100 * problem.budget.numerical_change:.2g} % of what an effect changes of it, alike for like drops; in all drops "
+        f"together {100 * problem.budget.numerical_slope:.2g} % for every factor of 2.7 in depth over tip radius, "
+        f"{100 * problem.budget.numerical_strength:.2g} % of p_m, and a contact that is off by "
+        f"{100 * problem.budget.contact_offset:.2g} % of the tip radius. p_m is told wider by "
+        f"{100 * problem.budget.other_codes:.2g} %, for other codes differ by more."
     )

@@ -51,7 +51,7 @@ def describe_causes(found: Diagnosis, summary: dict) -> dict[str, Any]:
         words += f" The nominal fit {missed}."
     if found.verdict.word == "unknown":
         words += f" {_say_unknown(found)}"
-    against = [f"{name}: {reason}" for name, reason in found.bench.reasons.items()]
+    against = [f"{name}: {reason}" for name, reason in found.problem.reasons.items()]
     return {"words": words, "rows": rows, "rest": rest, "against": against}
 
 
@@ -68,7 +68,7 @@ def _title(found: Diagnosis, causes: Sequence[str]) -> str:
         "none": "The nominal simulation is right within its errors",
         "unknown": "Something that no listed cause explains",
     }
-    known = found.bench.effects
+    known = found.problem.effects
     return "; ".join(fixed.get(name) or (known[name].title if name in known else name) for name in causes)
 
 
@@ -101,7 +101,7 @@ def describe_untestable(found: Diagnosis) -> dict[str, Any] | None:
             each.name,
             _title(found, [each.name]),
             f"{each.values[0]:.3g} to {each.values[1]:.3g} "
-            + found.bench.effects[each.name].amplitudes[0].unit.removesuffix("1"),
+            + found.problem.effects[each.name].amplitudes[0].unit.removesuffix("1"),
             "{:.3g} to {:.3g}".format(*(p / 1e3 for p in each.p_m)),
         )
         for each in found.untestable

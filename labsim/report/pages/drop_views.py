@@ -16,7 +16,7 @@ from ...inference.fits.posterior import Posterior
 from ...inference.observations.acceleration_model import AccelerationModel
 from ...inference.observations.drop_model import DropModel
 from ...inference.observations.push_model import PushModel
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import STANDARD_GRAVITY, FloatArray, Projectile
 
 BEFORE = 0.3  # share of the record after contact that is shown before it
@@ -122,19 +122,19 @@ def list_posteriors(found: Diagnosis) -> list[tuple[str, Posterior]]:
     return list(zip(names, (found.posterior_nominal, found.posterior_extended), strict=False))
 
 
-def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropView]:
+def view_drops(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> list[DropView]:
     """Every drop that entered the likelihood, in the order of the campaign, with each named fit."""
     views = []
     first = fits[0][1]
-    offsets = {name: contact_offset(bench, fit) for name, fit in fits}
-    tracks = bench.tracks
+    offsets = {name: contact_offset(problem, fit) for name, fit in fits}
+    tracks = problem.tracks
     seen_by = {name: tracks.instants(fit.nuisances[0]) for name, fit in fits}
     for k, (model, instant) in enumerate(
         zip(tracks.models, tracks.instants(first.nuisances[0]), strict=True)
     ):
         if isinstance(model, AccelerationModel):
             views.append(
-                _view_acceleration(bench, fits, model, instant, [seen_by[name][k] for name, _ in fits])
+                _view_acceleration(problem, fits, model, instant, [seen_by[name][k] for name, _ in fits])
             )
             continue
         if isinstance(model, PushModel):
@@ -144,7 +144,7 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
         seen = clock > -BEFORE * max(clock.max(), 1e-9)
         simulated = {}
         for name, fit in fits:
-            simulated[name] = predict_drop(bench, fit, model, seen_by[name][k], offsets[name])[seen]
+            simulated[name] = predict_drop(problem, fit, model, seen_by[name][k], offsets[name])[seen]
         views.append(
             DropView(
                 observed.name,
@@ -153,7 +153,7 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
                 clock[seen],
                 observed.depth[seen],
                 simulated,
-                allow_for_errors(bench, first, model)[seen],
+                allow_for_errors(problem, first, model)[seen],
                 observed.sigma,
             )
         )
@@ -161,7 +161,7 @@ def view_drops(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[DropVi
 
 
 def _view_acceleration(
-    bench: Workbench,
+    problem: Problem,
     fits: Sequence[tuple[str, Fit]],
     model: AccelerationModel,
     instant: Instant,
@@ -173,9 +173,9 @@ def _view_acceleration(
     seen = clock > -BEFORE * clock.max()
     simulated, ends = {}, {"": model.deepest}
     for (name, fit), own in zip(fits, instants, strict=True):
-        log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[observed.name]
+        log_p_m = fit.log_p_m + problem.log_offsets(fit.values)[observed.name]
         code = model.table.code(log_p_m, own.log_speed, fit.values)
-        simulated[name] = model.predict(code, bench.instruments(fit.values)[observed.name], own)
+        simulated[name] = model.predict(code, problem.instruments(fit.values)[observed.name], own)
         ends[name] = math.exp(float(code[0]))
     last = model.lengths[-1]
     # measured depth at the stop: that of the first fit and what the record integrates to beyond it
@@ -201,12 +201,12 @@ def _view_acceleration(
 
 
 def predict_drop(
-    bench: Workbench, fit: Fit, model: DropModel, instant: Instant, contact: float
+    problem: Problem, fit: Fit, model: DropModel, instant: Instant, contact: float
 ) -> FloatArray:
     """Stated depth (m) at the drop's frames; instant : its nuisances; contact : the fit's contact_offset."""
     name = model.observed.name
-    instrument = bench.instruments(fit.values)[name]
-    log_p_m = fit.log_p_m + bench.log_offsets(fit.values)[name]
+    instrument = problem.instruments(fit.values)[name]
+    log_p_m = fit.log_p_m + problem.log_offsets(fit.values)[name]
     code = model.table.code(log_p_m, instant.log_speed, fit.values)
     offset = instrument.row_offset_px * model.observed.pixel
     offset += contact * model.radius
@@ -214,11 +214,11 @@ def predict_drop(
     return predict_depth(code, time, instant, instrument, offset)
 
 
-def contact_offset(bench: Workbench, fit: Fit) -> float:
+def contact_offset(problem: Problem, fit: Fit) -> float:
     """Best value, in tip radii, of the offset of the contact that the likelihood allows all drops in common."""
-    drops, size = fit.drops, bench.terms.contact_offset
+    drops, size = fit.drops, problem.budget.contact_offset
     column = np.zeros(drops.residual.size)
-    for model in bench.tracks.models:
+    for model in problem.tracks.models:
         if not isinstance(model, DropModel):
             continue
         section = drops.sections[model.observed.name]
@@ -226,7 +226,7 @@ def contact_offset(bench: Workbench, fit: Fit) -> float:
     return size * float(column @ drops.solve(drops.residual))
 
 
-def allow_for_errors(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray:
+def allow_for_errors(problem: Problem, fit: Fit, model: DropModel) -> FloatArray:
     """(frames,) m: standard deviation of measured minus predict_drop if the model were true.
 
     The likelihood's own variances without what predict_drop has already moved to its best value (contact time, speed,
@@ -238,7 +238,7 @@ def allow_for_errors(bench: Workbench, fit: Fit, model: DropModel) -> FloatArray
     start = drops.sections[observed.name].start
     variance = np.diag(drops.covariance)[start : start + points].copy()
     variance -= np.sum(drops.local[place][:points, :3] ** 2, axis=1)
-    variance -= (bench.terms.contact_offset * model.radius) ** 2
+    variance -= (problem.budget.contact_offset * model.radius) ** 2
     variance -= observed.sigma**2 * np.sum(model.matrix**2, axis=1)
     systematic = np.interp(observed.time, model.matrix @ observed.time, np.maximum(variance, 0.0))
     return np.sqrt(systematic + observed.sigma**2)

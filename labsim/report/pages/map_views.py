@@ -12,7 +12,7 @@ from ...ct.reduce import reduce_scan
 from ...errors import MeasurementError
 from ...inference.fits.fitting import Fit
 from ...inference.observations.compacted_zone import CompactedZones
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import Campaign, FillingMap, FloatArray
 
 
@@ -37,16 +37,16 @@ class MapView:
         return float(np.sqrt(np.nanmean(self.left(fit) ** 2)))
 
 
-def view_maps(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[MapView]:
+def view_maps(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> list[MapView]:
     """Every scan of the likelihood; simulated dust is seen through the scan's own cells, blur and grey level."""
     views = []
-    number = next((k for k, each in enumerate(bench.observations) if isinstance(each, CompactedZones)), 0)
-    for place, scan in enumerate(bench.scans):
+    number = next((k for k, each in enumerate(problem.observations) if isinstance(each, CompactedZones)), 0)
+    for place, scan in enumerate(problem.scans):
         observed = scan.observed
         simulated = {}
         for name, fit in fits:
             code = scan.table.code(fit.log_p_m, float(fit.nuisances[number][place]), fit.values)
-            scale = bench.instruments(fit.values)[observed.name].ct_scale
+            scale = problem.instruments(fit.values)[observed.name].ct_scale
             full = np.full(observed.cells.shape, np.nan)
             full[observed.cells] = scale * code[1:]
             simulated[name] = full

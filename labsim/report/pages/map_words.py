@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import Campaign
 from .map_views import MapView
 from .page import show_number
 from .phrases import list_names
 
 
-def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView]) -> dict[str, Any]:
-    used = {scan.observed.name for scan in bench.scans}
+def describe_maps(campaign: Campaign, problem: Problem, maps: Sequence[MapView]) -> dict[str, Any]:
+    used = {scan.observed.name for scan in problem.scans}
     shown = {view.name for view in maps}
     words = []
     compared = [view.name for view in maps if view.simulated]
@@ -35,7 +35,7 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
     missing = [scan.name for scan in campaign.scans if scan.name not in shown]
     if missing:
         words.append(f"No map could be made of {list_names(missing)}; the warnings say why.")
-    if bench.undisturbed:
+    if problem.undisturbed:
         words.append("The undisturbed dust far from the beads is compared with the stated filling factor.")
     rows: list[list[dict[str, str]]] = []
     for k, view in enumerate(maps):
@@ -70,8 +70,8 @@ def describe_maps(campaign: Campaign, bench: Workbench, maps: Sequence[MapView])
     if not compared:  # one map a scan: side by side
         rows = [[panel for row in rows for panel in row]]
     undisturbed = ""
-    if bench.undisturbed:
-        means = [f"{dust.name} {np.mean(dust.filling_factor):.4f}" for dust in bench.undisturbed]
+    if problem.undisturbed:
+        means = [f"{dust.name} {np.mean(dust.filling_factor):.4f}" for dust in problem.undisturbed]
         sample = campaign.sample
         undisturbed = (
             f"Filling factor of dust that no bead reached, against depth, in the mean {', '.join(means)}; "

@@ -21,11 +21,11 @@ from ...inference.calibrate import Calibration
 from ...inference.fits.fitting import DOUBTFUL, Fit
 from ...inference.observations.push_model import PushModel
 from ...inference.observations.sleeve_friction import SOLVER, SleeveFriction
-from ...inference.workbench import Workbench
+from ...inference.problem import Problem
 from ...records import FloatArray
 from ..campaign_tables import say_calibrated, say_verdict
 from ..figures.campaign import draw_causes, draw_held_out, draw_p_m
-from ..figures.look import COLOURS, GREY, INK, new_figure
+from ..figures.style import COLOURS, GREY, INK, new_figure
 from ..provenance import trace_origin
 from .cause_words import BADGES, describe_causes
 from .drop_views import list_fits, list_posteriors
@@ -58,9 +58,9 @@ class PushView:
         return math.expm1(float(np.mean(self.left[fit])))
 
 
-def view_pushes(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[PushView]:
+def view_pushes(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> list[PushView]:
     """Every push with each named fit."""
-    models = [model for model in bench.tracks.models if isinstance(model, PushModel)]
+    models = [model for model in problem.tracks.models if isinstance(model, PushModel)]
     left: list[dict[str, FloatArray]] = [{} for _ in models]
     for label, fit in fits:
         residuals = [fit.drops.residual[fit.drops.sections[m.observed.name]][: m.data.size] for m in models]
@@ -75,7 +75,7 @@ def view_pushes(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> list[PushV
     for model, own in zip(models, left, strict=True):
         ground = model.ground_noise
         mean = np.full(model.data.size, 1.0 / model.data.size)
-        variance = bench.terms.scatter**2 + float(mean @ (ground @ ground.T) @ mean)
+        variance = problem.budget.scatter**2 + float(mean @ (ground @ ground.T) @ mean)
         views.append(
             PushView(model.observed.name, model.observed.impact_speed, model, own, math.sqrt(variance))
         )
@@ -200,9 +200,11 @@ def write_push_calibration(found: Calibration, folder: Path) -> Path:
     return _write(found, views, folder, tiles, "none" if explains else "unknown", badge, sentence)
 
 
-def say_sleeve(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> str:
+def say_sleeve(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> str:
     """What the sleeves read beside what each named fit simulates; empty where no record has one."""
-    ratios = [model.observed.friction_ratio for model in bench.tracks.models if isinstance(model, PushModel)]
+    ratios = [
+        model.observed.friction_ratio for model in problem.tracks.models if isinstance(model, PushModel)
+    ]
     measured = np.concatenate(ratios) if ratios else np.empty(0)
     measured = measured[np.isfinite(measured)]
     if not measured.size:
@@ -210,10 +212,10 @@ def say_sleeve(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> str:
     text = (
         f" The sleeve feels {100 * np.median(measured):.2g} % of the net resistance (median of all windows)"
     )
-    place = next((k for k, each in enumerate(bench.observations) if isinstance(each, SleeveFriction)), None)
+    place = next((k for k, each in enumerate(problem.observations) if isinstance(each, SleeveFriction)), None)
     if place is None:
         return text + "; that is shown alone, and compared where the record says sleeve = true."
-    sleeves = bench.observations[place]
+    sleeves = problem.observations[place]
     assert isinstance(sleeves, SleeveFriction)
     simulated = [
         f"{100 * float(np.median(sleeves.data - fit.blocks[place].residual)):.2g} % ({label.replace('_', ' ')})"
@@ -223,7 +225,7 @@ def say_sleeve(bench: Workbench, fits: Sequence[tuple[str, Fit]]) -> str:
 
 
 def _draw(found: Diagnosis | Calibration, fits: Sequence[tuple[str, Fit]], folder: Path) -> list[PushView]:
-    views = view_pushes(found.bench, fits)
+    views = view_pushes(found.problem, fits)
     draw_pushes(views, folder / "pushes.png")
     draw_misfit(views, folder / "misfit.png")
     return views
@@ -250,8 +252,8 @@ def _write(
         f"to {deepest:.3g} m. The simulation pushes the same tip deep into even matter ({say_law(campaign.material.law)}); "
         f"what it says of the resistance, in units of {label}, holds at every depth. How the strength grows with depth is free: "
         "each window of depth has a value that all pushes share. Beside that each push may differ by a factor, "
-        f"{100 * found.bench.terms.scatter:.2g} % from one to the next, and along its depth by {100 * ground.size:.2g} % over "
-        f"{ground.length:.2g} m, as these records show." + say_sleeve(found.bench, list_fits(found))
+        f"{100 * found.problem.budget.scatter:.2g} % from one to the next, and along its depth by {100 * ground.size:.2g} % over "
+        f"{ground.length:.2g} m, as these records show." + say_sleeve(found.problem, list_fits(found))
     )
     labels = list(views[0].left)
     rows = [

@@ -43,7 +43,7 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
         else:
             said.append(f"first tell {' from '.join(map(say_hypothesis, pair))}: {best.change}")
     for name in found.verdict.probabilities[0][0]:
-        effect = found.bench.effects[name]
+        effect = found.problem.effects[name]
         value = 0.0
         if effect.amplitudes:
             parameter = f"{name}.{effect.amplitudes[0].name}"

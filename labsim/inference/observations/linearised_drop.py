@@ -28,7 +28,7 @@ ALIKE = (REACH, 2.0, 1.5)
 
 
 @dataclass(frozen=True)
-class Terms:
+class ErrorBudget:
     """Sizes of the error terms; zero switches one off."""
 
     scatter: float = 0.02  # of ln p_m from sample to sample
@@ -49,7 +49,7 @@ class Terms:
     heights: bool = True
 
 
-class Probe(NamedTuple):
+class Perturbation(NamedTuple):
     """A neighbouring point. amplitudes : effect -> amplitude; instruments, log_offsets (of ln p_m) : by name of drop or scan;
     setting : (name of drop or scan) -> what would be simulated there, for those whose data need no run; step : by how much one
     global differs there."""
@@ -78,7 +78,7 @@ class NumericalError:
 
 
 @dataclass(frozen=True)
-class DropTerms:
+class LinearisedDrop:
     """One drop about one point. residual, white (variance) : (n,); local : (n, nuisances) scaled by their prior widths;
     pull : (nuisances,) current nuisances over prior widths; tangents : name -> (n,); shared : name -> (n,), errors with one
     value for several drops."""
@@ -104,12 +104,12 @@ def linearise_drop(
     model: RecordModel,
     instant: Instant,
     log_p_m: float,
-    nominal: Probe,
-    terms: Terms,
-    probes: Mapping[str, Probe],
+    nominal: Perturbation,
+    budget: ErrorBudget,
+    perturbations: Mapping[str, Perturbation],
     *,
     with_others: bool = False,
-) -> DropTerms:
+) -> LinearisedDrop:
     """Residual, errors and tangents of one drop; instant : its nuisances; nominal : the point itself (its step means nothing);
     with_others : other records are of the same drop, and have the strength of its dust in common with it."""
     observed = model.observed
@@ -127,17 +127,19 @@ def linearise_drop(
     by_strength = (model.predict(strong_code, instrument, instant) - here) / 1e-2
 
     tangents = {"ln_p_m": by_strength}
-    for probe, point in probes.items():
+    for perturbation, point in perturbations.items():
         there = log_p_m + point.log_offsets.get(name, 0.0)
         at = response if there == lp else model.table.at(there, instant.log_speed)
         moved = at.code(point.amplitudes)
         if np.array_equal(moved, code) and point.instruments[name] == instrument:
-            tangents[probe] = np.zeros(n)
+            tangents[perturbation] = np.zeros(n)
         else:
-            tangents[probe] = (model.predict(moved, point.instruments[name], instant) - here) / point.step
+            tangents[perturbation] = (
+                model.predict(moved, point.instruments[name], instant) - here
+            ) / point.step
 
     mass = observed.drop.projectile
-    scatter = math.hypot(terms.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
+    scatter = math.hypot(budget.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
     own_errors = model.own_errors
     own_strength = by_strength * max(scatter, LEAST_SCATTER)
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
@@ -157,11 +159,11 @@ def linearise_drop(
     reach = float(code[0]) - math.log(model.radius)
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
-        **model.share(here, differ, (terms.pixel_scale, terms.frame_scale, terms.contact_offset)),
+        **model.share(here, differ, (budget.pixel_scale, budget.frame_scale, budget.contact_offset)),
         "numerical slope": model.slope(code, instrument, instant, here)
         * (reach - USUAL_DEPTH)
-        * terms.numerical_slope,
-        "numerical strength": by_strength * terms.numerical_strength,
+        * budget.numerical_slope,
+        "numerical strength": by_strength * budget.numerical_strength,
     }
     for setting, (amplitude, sigma) in model.numerics.items():
         if model.table.knows(setting):
@@ -170,10 +172,10 @@ def linearise_drop(
     if with_others:
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
-    off, length, changes = model.find_solver_error(here, clock, final, instrument, terms.numerical)
+    off, length, changes = model.find_solver_error(here, clock, final, instrument, budget.numerical)
     if model.changes_differ and code is not response.plain:
         change = here - model.predict(response.plain, instrument, instant)
-        off = np.hypot(off, terms.numerical_change * change)
+        off = np.hypot(off, budget.numerical_change * change)
     numerical = NumericalError(
         off,
         np.clip(clock / stop, 0.0, 1.0),
@@ -184,7 +186,7 @@ def linearise_drop(
         length,
         changes,
     )
-    drop = DropTerms(
+    drop = LinearisedDrop(
         model.data - here,
         model.data_variance,
         local,
@@ -193,7 +195,7 @@ def linearise_drop(
         shared,
         numerical,
     )
-    if terms.heights:
+    if budget.heights:
         for expected, sigma in list_speeds(model):
             drop = _add_speed(drop, expected - instant.log_speed, sigma)
     # nuisances are zero-mean about their priors, not about here
@@ -217,14 +219,14 @@ def list_speeds(model: RecordModel) -> list[tuple[float, float]]:
     return found
 
 
-def _add_speed(drop: DropTerms, left: float, sigma: float) -> DropTerms:
+def _add_speed(drop: LinearisedDrop, left: float, sigma: float) -> LinearisedDrop:
     """One more datum: ln v."""
 
     def pad(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         return {name: np.append(column, 0.0) for name, column in values.items()}
 
     numerical = drop.numerical
-    return DropTerms(
+    return LinearisedDrop(
         np.append(drop.residual, left),
         np.append(drop.white, sigma**2),
         np.vstack([drop.local, np.where(np.arange(drop.local.shape[1]) == 1, SPEED_WIDTH, 0.0)]),

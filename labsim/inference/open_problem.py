@@ -1,4 +1,4 @@
-"""From a campaign to its workbench: families of drops and scans, their speeds of simulation, effects that can be at work."""
+"""From a campaign to its problem: groups of drops and scans, their speeds of simulation, effects that can be at work."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from .emulation.grid import (
     FELT_STEPS,
     PUSH_RATIO,
     SPEED_RATIO,
-    Family,
+    ProjectileGroup,
     RunGrid,
-    few_positions,
     own_speeds,
     scan_speeds,
+    sparse_positions,
     speed_nodes,
 )
 from .observations import Observation, RunFeatures, observe_further
 from .observations.acceleration_model import make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
 from .observations.drop_model import make_drop_model
-from .observations.drop_terms import RecordModel, Terms
+from .observations.linearised_drop import ErrorBudget, RecordModel
 from .observations.observe import Observed, observe_drops
 from .observations.observe_acceleration import ObservedImpact
 from .observations.observe_push import ObservedPush, measure_ground
@@ -40,19 +40,19 @@ from .observations.push_model import PushModel, encode_push
 from .observations.sleeve_friction import SleeveFriction, TipSleeves, encode_sleeve, measure_spread
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
+from .problem import Problem
 from .supported import refuse_others
-from .workbench import Workbench
 
 Seen = TypeVar("Seen")
 SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
 
 
-def open_workbench(
+def open_problem(
     campaign: Campaign,
     store: RunStore,
     effects: Mapping[str, Effect],
     *,
-    terms: Terms | None = None,
+    budget: ErrorBudget | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
@@ -61,7 +61,7 @@ def open_workbench(
     scans: Sequence[ObservedScan] = (),
     undisturbed: Sequence[UndisturbedDust] = (),
     model: Model | None = None,
-) -> Workbench:
+) -> Problem:
     """Measure the campaign and lay out the grid of runs; nothing is simulated yet."""
     refuse_others(campaign)
     drops = drops if drops is not None else observe_drops(campaign)[0]
@@ -71,7 +71,7 @@ def open_workbench(
         campaign, effects, felt=any(isinstance(drop, ObservedImpact) for drop in drops)
     )
     errors = {name: (each.amplitudes[0].step, each.amplitudes[0].prior.sd) for name, each in numerics.items()}
-    families: list[Family] = []
+    groups: list[ProjectileGroup] = []
     observations: list[Observation] = []
     models: list[RecordModel] = []
     features: list[RunFeatures] = []
@@ -92,28 +92,28 @@ def open_workbench(
         speeds_seen = [drop.impact_speed for drop in group]
         if felt:
             nodes = own_speeds(speeds_seen)
-            few = few_positions(nodes, min(nodes), max(nodes))
+            sparse = sparse_positions(nodes, min(nodes), max(nodes))
         else:
-            nodes, few = _lay_out_speeds(speeds_seen, SPEED_MARGIN, PUSH_RATIO if pushes else SPEED_RATIO)
-        table = ResponseTable(np.log(nodes), few)
+            nodes, sparse = _lay_out_speeds(speeds_seen, SPEED_MARGIN, PUSH_RATIO if pushes else SPEED_RATIO)
+        table = ResponseTable(np.log(nodes), sparse)
         if pushes:
             ground = measure_ground(pushes)
             numbers = sorted({int(n) for push in pushes for n in push.windows})
             reference = numbers[len(numbers) // 2]
             encode = partial(encode_push, whole=pushes[0].feels_shaft)
-            features.append(RunFeatures(len(families), table, encode))
-            families.append(Family(projectile, nodes, False, few, pushed=True))
+            features.append(RunFeatures(len(groups), table, encode))
+            groups.append(ProjectileGroup(projectile, nodes, False, sparse, pushed=True))
             models += [PushModel(push, table, ground, reference) for push in pushes]
             with_sleeve = [push for push in pushes if push.compares_sleeve]
             if with_sleeve:
-                ratios = RunFeatures(len(families) - 1, ResponseTable(np.log(nodes), few), encode_sleeve)
+                ratios = RunFeatures(len(groups) - 1, ResponseTable(np.log(nodes), sparse), encode_sleeve)
                 sleeves.append(TipSleeves(tuple(with_sleeve), ratios, measure_spread(with_sleeve)))
             continue
-        features.append(RunFeatures(len(families), table, encode_run))
-        families.append(Family(projectile, nodes, False, few, felt=felt))
-        speeds = ResponseTable(np.log(nodes), few)
+        features.append(RunFeatures(len(groups), table, encode_run))
+        groups.append(ProjectileGroup(projectile, nodes, False, sparse, felt=felt))
+        speeds = ResponseTable(np.log(nodes), sparse)
         if felt:
-            of_speeds.append(RunFeatures(len(families) - 1, speeds, encode_speeds))
+            of_speeds.append(RunFeatures(len(groups) - 1, speeds, encode_speeds))
         models += [
             make_acceleration_model(drop, speeds, errors)
             if isinstance(drop, ObservedImpact)
@@ -126,36 +126,36 @@ def open_workbench(
         observations.append(SleeveFriction(tuple(sleeves)))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
-        nodes, few = scan_speeds([scan.scan.speed.value for scan in scanned])
+        nodes, sparse = scan_speeds([scan.scan.speed.value for scan in scanned])
         for scan in scanned:
             encode = partial(encode_scan_run, observed=scan)
-            own = RunFeatures(len(families), ResponseTable(np.log(nodes), few), encode)
+            own = RunFeatures(len(groups), ResponseTable(np.log(nodes), sparse), encode)
             zones.append(CompactedZone(scan, own))
-        families.append(Family(projectile, nodes, True, few))
+        groups.append(ProjectileGroup(projectile, nodes, True, sparse))
     if zones:
         observations.append(CompactedZones(tuple(zones)))
     if undisturbed:
         observations.append(Layering(tuple(undisturbed), campaign.sample.filling_factor_sigma))
     observations += observe_further(campaign)
-    grid = RunGrid(campaign, store, families, workers=workers, scheduler=scheduler, progress=progress)
+    grid = RunGrid(campaign, store, groups, workers=workers, scheduler=scheduler, progress=progress)
     if cells:
         grid.cells = cells
     places = list_places(campaign)
-    bench = Workbench(
+    problem = Problem(
         campaign,
         drops,
         grid,
-        families,
+        groups,
         places,
         resolved,
         numerics,
-        terms or Terms(),
+        budget or ErrorBudget(),
         tuple(observations),
         reasons,
     )
     if model is not None:
-        extend(bench, model)
-    return bench
+        extend(problem, model)
+    return problem
 
 
 def resolve_effects(
@@ -180,21 +180,21 @@ def resolve_effects(
     return causes, numerics, reasons
 
 
-def extend(bench: Workbench, model: Model) -> None:
+def extend(problem: Problem, model: Model) -> None:
     """Take a model's effects and material into the nominal model; its p_m stays what is looked for.
 
     Raises EffectError where one of its effects cannot be at work in this campaign.
     """
-    check_model(model, bench.campaign, list_effects(bench.campaign), bench.campaign.folder)
-    held = [(name, values) for name, values in model.effects if not bench.strength_only(name)]
+    check_model(model, problem.campaign, list_effects(problem.campaign), problem.campaign.folder)
+    held = [(name, values) for name, values in model.effects if not problem.rescales_p_m(name)]
 
     def apply(setting: DropSetting) -> DropSetting:
         setting = setting.replace(material=setting.material.replace(**dict(model.material)))
-        setting = apply_effects(setting, held, bench.place_of(setting.projectile.tip), bench.effects)
+        setting = apply_effects(setting, held, problem.place_of(setting.projectile.tip), problem.effects)
         return apply_law(setting, model.law)
 
-    bench.model = model
-    bench.grid.extension = apply
+    problem.model = model
+    problem.grid.extension = apply
 
 
 def _lay_out_speeds(
@@ -203,7 +203,7 @@ def _lay_out_speeds(
     """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
     slowest, fastest = min(speeds) / margin, max(speeds) * margin
     nodes = speed_nodes(slowest, fastest, ratio)
-    return nodes, few_positions(nodes, slowest, fastest)
+    return nodes, sparse_positions(nodes, slowest, fastest)
 
 
 def group_alike(

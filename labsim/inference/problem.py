@@ -14,29 +14,29 @@ from ..effects.model import Model, make_instrument
 from ..records import Campaign, FloatArray
 from ..sph import DropSetting
 from .emulation.forward import ResponseTable
-from .emulation.grid import Change, Family, Request, RunGrid, RunKey
+from .emulation.grid import Change, ProjectileGroup, Request, RunGrid, RunKey
 from .emulation.nodes import amplitude_nodes, enclosing_nodes, screening_node
 from .observations import Observation, RunFeatures
 from .observations.compacted_zone import CompactedZone, CompactedZones
-from .observations.drop_terms import Terms
+from .observations.linearised_drop import ErrorBudget
 from .observations.observe import Observed
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
 
 
 @dataclass
-class Workbench:
+class Problem:
     """A measured campaign with its runs: everything a fit needs."""
 
     campaign: Campaign
     drops: list[Observed]
     grid: RunGrid
-    families: list[Family]
+    groups: list[ProjectileGroup]
     places: dict[str, Place]
     effects: dict[str, Effect]
     # of the solver's settings: what they change is an error of drops that an accelerometer feels, and no cause
     numerics: dict[str, Effect]
-    terms: Terms
+    budget: ErrorBudget
     observations: tuple[Observation, ...]  # all drops first
     reasons: dict[str, str]  # why an effect does not apply
     warnings: list[str] = field(default_factory=list)
@@ -75,7 +75,7 @@ class Workbench:
     @property
     def felt(self) -> bool:
         """Whether an accelerometer is on some drops: runs are rough there, and steps of effects long."""
-        return any(family.felt for family in self.families)
+        return any(group.felt for group in self.groups)
 
     @property
     def node_step(self) -> float:
@@ -89,9 +89,9 @@ class Workbench:
         return [each for observation in self.observations for each in observation.features]
 
     def _encode(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
-        """Codes of one family, (speeds, spacings, m), for each table that rests on them; None where a run failed."""
+        """Codes of one group, (speeds, spacings, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(request, number)
-        alike = len(self.families[number].spacings(request.few, 0, request.variant != ""))
+        alike = len(self.groups[number].spacings(request.sparse, 0, request.variant != ""))
 
         def encode(each: RunFeatures) -> FloatArray | None:
             if runs is None:
@@ -99,7 +99,7 @@ class Workbench:
             codes = np.array([each.encode(run) for run in runs])
             return codes.reshape(-1, alike, codes.shape[1])
 
-        return [(each.table, encode(each)) for each in self.features if each.family == number]
+        return [(each.table, encode(each)) for each in self.features if each.group == number]
 
     def _encode_plain(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
         """Codes of the nominal model, encoded once."""
@@ -120,35 +120,35 @@ class Workbench:
             return
         self._filled.add(request.of(number))
         before, after = self._encode_plain(number, plain), self._encode(number, request)
-        spacings = self.families[number].spacings  # a change is one from the run of the same spacing
+        spacings = self.groups[number].spacings  # a change is one from the run of the same spacing
         for (table, codes), (_, codes_before) in zip(after, before, strict=True):
-            kept = table.fingerprints if request.few else table.changes
+            kept = table.fingerprints if request.sparse else table.changes
             entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
             if codes is not None and codes_before is not None:
                 own = [
-                    spacings(request.few, k, False).index(f)
+                    spacings(request.sparse, k, False).index(f)
                     for k in range(len(codes))
-                    for f in spacings(request.few, k, True)
+                    for f in spacings(request.sparse, k, True)
                 ]
                 alike = np.take_along_axis(codes_before, np.reshape(own, (len(codes), -1, 1)), axis=1)
                 entry[amplitude] = (codes - alike).mean(axis=1)
 
-    def state(self, family: Family, name: str = "") -> DropSetting:
-        """The nominal model of one family, or of one of its pushes at its own speed, in the middle of the range of p_m."""
-        speed = family.speeds[0]
-        for drop in self.campaign.drops if family.pushed else ():
+    def state(self, group: ProjectileGroup, name: str = "") -> DropSetting:
+        """The nominal model of one group, or of one of its pushes at its own speed, in the middle of the range of p_m."""
+        speed = group.speeds[0]
+        for drop in self.campaign.drops if group.pushed else ():
             if drop.name == name:
                 speed = dict(drop.motion.values)["speed"]
-        return self.grid.setting(family, speed, math.sqrt(math.prod(self.campaign.p_m_range)))
+        return self.grid.setting(group, speed, math.sqrt(math.prod(self.campaign.p_m_range)))
 
-    def strength_only(self, name: str) -> bool:
+    def rescales_p_m(self, name: str) -> bool:
         """Whether an effect changes nothing of a drop but p_m: then the base runs already hold it."""
         effect = self.effects[name]
         if effect.change_setting is None or not effect.amplitudes:
             return False
         parameter = effect.amplitudes[0]
-        setting = self.state(self.families[0])
+        setting = self.state(self.groups[0])
         place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
         changed = effect.apply(setting, {parameter.name: parameter.hold(parameter.step)}, place)
         back = changed.replace(material=set_value(changed.material, read_value(setting.material)))
@@ -181,7 +181,7 @@ class Workbench:
 
     def require_base(self, indices: Sequence[float]) -> None:
         self.grid.require([Request("", None, index) for index in indices], "nominal model")
-        for number in range(len(self.families)):
+        for number in range(len(self.groups)):
             for index in indices:
                 self._fill_base(number, index)
 
@@ -189,22 +189,22 @@ class Workbench:
         self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step))
 
     def require_changes(
-        self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, few: bool = False
+        self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, sparse: bool = False
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect; at few
         speeds they are fingerprints."""
-        if few:  # no fingerprint is looked at where there are changes
+        if sparse:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
         plain = {
-            index: Request("", None, index, few, coarse=True) for index in sorted({i for *_, i in wanted})
+            index: Request("", None, index, sparse, coarse=True) for index in sorted({i for *_, i in wanted})
         }
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, few, coarse=True)
+            Request(self._variant(name, a), self.change(name, a), index, sparse, coarse=True)
             for name, a, index in wanted
         ]
         self.grid.require([*plain.values(), *changed], text)
-        for number in range(len(self.families)):
+        for number in range(len(self.groups)):
             for (name, amplitude, index), request in zip(wanted, changed, strict=True):
                 self._fill_change(number, request, plain[index], name, amplitude)
 
@@ -220,7 +220,7 @@ class Workbench:
                 if not self._has_fingerprint(name, index)
                 for amplitude in amplitude_nodes(self._find(name), 0.0, side=side)
             ]
-            self.require_changes(wanted, text, few=True)
+            self.require_changes(wanted, text, sparse=True)
 
     def _has_fingerprint(self, name: str, index: float) -> bool:
         """Whether every projectile has a run at a strength node by which an effect is known there."""
@@ -234,7 +234,7 @@ class Workbench:
         place = self.places.get(name) or replace(
             next(iter(self.places.values())), name=name, sequence_fraction=0.0
         )
-        setting = self.state(self.families[0])
+        setting = self.state(self.groups[0])
         for effect, amplitude in amplitudes.items():
             if amplitude != 0.0:
                 setting = self.effects[effect].apply(setting, self.at(effect, amplitude), place)
@@ -263,19 +263,17 @@ class Workbench:
         changes = [
             (effect_name, self.at(effect_name, amplitude))
             for effect_name, amplitude in amplitudes.items()
-            if amplitude != 0.0 and self.strength_only(effect_name)
+            if amplitude != 0.0 and self.rescales_p_m(effect_name)
         ]
-        changes += (
-            [(n, dict(v)) for n, v in self.model.effects if self.strength_only(n)] if self.model else []
-        )
+        changes += [(n, dict(v)) for n, v in self.model.effects if self.rescales_p_m(n)] if self.model else []
         for effect_name, values in changes:
             for name, place in self.places.items():
-                setting = self.state(self.families[0], name)
+                setting = self.state(self.groups[0], name)
                 if name in projectiles:
                     setting = setting.replace(projectile=projectiles[name])
                 changed = self.effects[effect_name].apply(setting, values, place)
                 offsets[name] += math.log(read_value(changed.material) / read_value(setting.material))
         return offsets
 
-    def costs_runs(self, name: str) -> bool:
-        return self.effects[name].costs_runs and not self.strength_only(name)
+    def affects_simulation(self, name: str) -> bool:
+        return self.effects[name].affects_simulation and not self.rescales_p_m(name)

@@ -6,7 +6,7 @@ import laws
 
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
-from labsim.inference.open_workbench import group_alike
+from labsim.inference.open_problem import group_alike
 from labsim.records import Projectile
 
 
@@ -34,7 +34,7 @@ def test_what_no_simulation_depends_on_does_not():
 
 def test_drops_and_scans_of_one_size_have_runs_of_their_own(tmp_path):
     campaign = read_campaign(laws.write_campaign(tmp_path / "made", scan=True))
-    bench, _ = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1)
-    drops, scans = ([each.family for each in seen.features] for seen in bench.observations[:2])
+    problem, _ = prepare(campaign, laws.LawStore(tmp_path / "store"), workers=1)
+    drops, scans = ([each.group for each in seen.features] for seen in problem.observations[:2])
     assert drops == [0, 1, 2] and scans == [3]
-    assert [family.is_scan for family in bench.families] == [False, False, False, True]
+    assert [group.is_scan for group in problem.groups] == [False, False, False, True]
