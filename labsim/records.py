@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+from jaxtyping import Bool, Float, Int, Real
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
@@ -411,11 +412,11 @@ class Track(Summarised):
     frame : (n,) int; time : (n,) s; tip_row, sigma : (n,) px; valid : (n,) bool; reason : (n,) str, "" where valid.
     """
 
-    frame: npt.NDArray[np.int64]
-    time: FloatArray
-    tip_row: FloatArray
-    sigma: FloatArray
-    valid: npt.NDArray[np.bool_]
+    frame: Int[np.ndarray, " n"]
+    time: Float[np.ndarray, " n"]
+    tip_row: Float[np.ndarray, " n"]
+    sigma: Float[np.ndarray, " n"]
+    valid: Bool[np.ndarray, " n"]
     reason: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
@@ -434,13 +435,13 @@ class DecelerationCurve(Summarised):
     acceleration, acceleration_sigma : m/s^2.
     """
 
-    time: FloatArray
-    depth: FloatArray
-    depth_sigma: FloatArray
-    velocity: FloatArray
-    velocity_sigma: FloatArray
-    acceleration: FloatArray
-    acceleration_sigma: FloatArray
+    time: Float[np.ndarray, " n"]
+    depth: Float[np.ndarray, " n"]
+    depth_sigma: Float[np.ndarray, " n"]
+    velocity: Float[np.ndarray, " n"]
+    velocity_sigma: Float[np.ndarray, " n"]
+    acceleration: Float[np.ndarray, " n"]
+    acceleration_sigma: Float[np.ndarray, " n"]
     contact_time: Measured  # s, on the track's clock
     impact_speed: Measured  # m/s
     penetration_depth: Measured  # m
@@ -451,11 +452,11 @@ class DecelerationCurve(Summarised):
     apparent_gravity: Measured | None = None
     rebound_speed: Measured | None = None  # m/s upwards, None where the projectile comes to rest
     # px, (m,) every frame of the track minus the fit, NaN where not fitted
-    residual: FloatArray | None = None
-    used: npt.NDArray[np.bool_] | None = None  # (m,) frames of the track that the fit stands on
+    residual: Float[np.ndarray, " m"] | None = None
+    used: Bool[np.ndarray, " m"] | None = None  # (m,) frames of the track that the fit stands on
     degree: int | None = None  # of the polynomial of the deceleration
     # s, (m,) times of the track's frames as the fit took them: not the track's where frames were lost silently
-    clock: FloatArray | None = None
+    clock: Float[np.ndarray, " m"] | None = None
 
     def say(self) -> str:
         """Depth, speed and stopping time."""
@@ -474,11 +475,11 @@ class FillingMap(Summarised):
     filling_factor, sigma : (nz, nr), NaN where nothing was averaged; count : (nz, nr) voxels in the mean.
     """
 
-    r: FloatArray
-    z: FloatArray
-    filling_factor: FloatArray
-    sigma: FloatArray
-    count: FloatArray
+    r: Float[np.ndarray, " nr"]
+    z: Float[np.ndarray, " nz"]
+    filling_factor: Float[np.ndarray, "nz nr"]
+    sigma: Float[np.ndarray, "nz nr"]
+    count: Real[np.ndarray, "nz nr"]
     tip_depth: float  # m, lowest point of the bead below the undisturbed surface, positive
     bead_radius: float  # m
     axis_px: tuple[float, float]

@@ -15,6 +15,10 @@ import pytest
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")  # before numpy is loaded here, in workers and in commands
 
+from shapes import check_shapes  # noqa: E402
+
+check_shapes()  # before labsim is imported
+
 # begun first, so that no worker is left alone with one of them at the end
 LONGEST = (
     "tests/diagnosis/test_campaign.py",

@@ -220,7 +220,7 @@ def test_a_hard_stop_loses_no_frame():
 
 def test_globals_of_which_the_data_say_nothing_are_an_extrapolation():
     """A trial step may go where the simulated drop hardly moves; it is given up as every other that leaves the runs."""
-    block = Block(np.ones(4), np.eye(4), {"ln_p_m": np.zeros(4)}, np.zeros(4))
+    block = Block(np.ones(4), np.eye(4), {"ln_p_m": np.zeros(4)})
     with pytest.raises(ExtrapolationError, match="p_m"):
         solve_globals([block], ["ln_p_m"], {})
 
@@ -231,7 +231,7 @@ def test_globals_are_generalised_least_squares():
     covariance = root @ root.T + np.eye(30)
     tangent, residual = rng.standard_normal(30), rng.standard_normal(30)
     blocks = [
-        Block(residual[part], covariance[part, part], {"ln_p_m": tangent[part]}, residual[part] * 0)
+        Block(residual[part], covariance[part, part], {"ln_p_m": tangent[part]})
         for part in (slice(0, 18), slice(18, 30))
     ]
     step, spread, chi, logdet, _ = solve_globals(blocks, ["ln_p_m"], {})

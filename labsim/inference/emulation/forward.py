@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from ...effects import Instrument, Parameter
 from ...errors import ExtrapolationError
@@ -81,8 +82,8 @@ class Response:
     table: ResponseTable
     log_p_m: float
     log_speed: float
-    across: FloatArray
-    plain: FloatArray
+    across: Float[np.ndarray, " speeds"]
+    plain: Float[np.ndarray, " m"]
 
     def code(self, amplitudes: Mapping[str, float]) -> FloatArray:
         """The code (m,) with effects; that of ``plain`` itself where none of them has runs in the table."""

@@ -7,9 +7,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
+from jaxtyping import Float
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from ...errors import ExtrapolationError
@@ -26,11 +27,11 @@ class Block:
     Arrays are never written to: the covariance is factorised once.
     """
 
-    residual: FloatArray
-    covariance: FloatArray
-    tangents: Mapping[str, FloatArray]
-    free: FloatArray | None = None
-    nuisances: FloatArray | None = None
+    residual: Float[np.ndarray, " n"]
+    covariance: Float[np.ndarray, "n n"]
+    tangents: Mapping[str, Float[np.ndarray, " n"]]
+    free: Float[np.ndarray, "n n"] | None = None
+    nuisances: Float[np.ndarray, "n k"] | None = None
     sections: Mapping[str, slice] = field(default_factory=dict)
 
     @cached_property
@@ -58,6 +59,7 @@ class Block:
         return float(white @ white)
 
 
+@runtime_checkable
 class Part(Protocol):
     """Data of one record about one point: a part of a Block."""
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class RunFeatures:
     encode: Callable[[Any], FloatArray]
 
 
+@runtime_checkable
 class Observation(Protocol):
     """Data whose errors are their own. Nuisances are arrays of the observation's own shape; an empty one where it has none."""
 

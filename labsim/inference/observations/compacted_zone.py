@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Bool, Float
 from scipy.spatial.distance import cdist
 
 from ...ct.project import project
@@ -49,11 +50,11 @@ class ObservedScan:
 
     scan: Scan
     reduced: ReducedScan
-    cells: np.ndarray  # (nz, nr) bool
-    filling_factor: FloatArray
-    sigma: FloatArray
+    cells: Bool[np.ndarray, "nz nr"]  # (nz, nr) bool
+    filling_factor: Float[np.ndarray, " n"]
+    sigma: Float[np.ndarray, " n"]
     undisturbed: float
-    beside: FloatArray
+    beside: Float[np.ndarray, " n"]
 
     @property
     def name(self) -> str:
@@ -142,13 +143,13 @@ class LinearisedZone:
     what its error changes; solver : (n + 1, errors) those of the solver that go through the whole zone; contrast : (n,) |φ - φ0|;
     reach : ln of the simulated depth over the tip radius."""
 
-    residual: FloatArray
-    own: FloatArray
-    tangents: Mapping[str, FloatArray]
-    speed: FloatArray
-    grey: FloatArray
-    solver: FloatArray
-    contrast: FloatArray
+    residual: Float[np.ndarray, " m"]
+    own: Float[np.ndarray, "m m"]
+    tangents: Mapping[str, Float[np.ndarray, " m"]]
+    speed: Float[np.ndarray, " m"]
+    grey: Float[np.ndarray, " m"]
+    solver: Float[np.ndarray, "m errors"]
+    contrast: Float[np.ndarray, " n"]
     reach: float
 
 

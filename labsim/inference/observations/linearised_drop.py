@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.distance import cdist
 
 from ...effects import Instrument
@@ -67,8 +68,8 @@ class NumericalError:
     final depth over tip radius), radius and mass (logarithms). length : over which share of the stopping time, changes : over
     how many e-folds of depth over tip radius it changes."""
 
-    size: FloatArray
-    fraction: FloatArray
+    size: Float[np.ndarray, " n"]
+    fraction: Float[np.ndarray, " n"]
     reach: float
     radius: float
     mass: float
@@ -83,12 +84,12 @@ class LinearisedDrop:
     pull : (nuisances,) current nuisances over prior widths; tangents : name -> (n,); shared : name -> (n,), errors with one
     value for several drops."""
 
-    residual: FloatArray
-    white: FloatArray
-    local: FloatArray
-    pull: FloatArray
-    tangents: Mapping[str, FloatArray]
-    shared: Mapping[str, FloatArray]
+    residual: Float[np.ndarray, " n"]
+    white: Float[np.ndarray, " n"]
+    local: Float[np.ndarray, "n k"]
+    pull: Float[np.ndarray, " k"]
+    tangents: Mapping[str, Float[np.ndarray, " n"]]
+    shared: Mapping[str, Float[np.ndarray, " n"]]
     numerical: NumericalError
 
 

@@ -94,7 +94,7 @@ def observe_push(drop: Drop, campaign: Campaign) -> ObservedPush:
         if n * width >= max(low - record.step, DEEP * radius) and (n + 1) * width <= high + record.step
     ]
     kept, values, errors = [], [], []
-    for n in whole:
+    for n in map(int, whole):
         inside = net[number == n]
         if inside.size < FEWEST or np.median(inside) <= 0.0:
             continue

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from ...ct.reduce import ReducedScan
 from ...records import FloatArray, Scan
@@ -35,9 +36,9 @@ class UndisturbedDust:
     """One scan away from its bead. depth (m, positive downwards), filling_factor, sigma : (n,); point_spread : m, measured."""
 
     scan: Scan
-    depth: FloatArray
-    filling_factor: FloatArray
-    sigma: FloatArray
+    depth: Float[np.ndarray, " n"]
+    filling_factor: Float[np.ndarray, " n"]
+    sigma: Float[np.ndarray, " n"]
     point_spread: float
 
     @property
