@@ -14,9 +14,9 @@ from ..inference.fits.fitting import Fit, Hypothesis
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1
 PRIOR_PAIRS = 0.1  # all pairs together
-# among causes: what tells one from another rests on details in which two solvers differ; and behind one that changes runs which
-# accelerometers feel: what it changes of a force is as rough as that is
-TEMPERATURE, ROUGH_TEMPERATURE = 3.0, 10.0
+# among causes and unknown: what tells one from another rests on details in which two solvers differ. And behind a cause that
+# changes runs which accelerometers feel: what it changes of a force is as rough as that is
+TEMPERATURE, ROUGH_TEMPERATURE = 4.0, 10.0
 # of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
 # most 5.5, the weakest that was 9.6
 NESTED = 2.0
@@ -84,8 +84,8 @@ def judge(
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
-    The best cause or pair counts in full against none and unknown. Among those that explain more than none, the others fall
-    off behind it by the difference of their gains over the temperature (NESTED where they are part of the best): they are told
+    What explains most counts in full against none. Among those that explain more than none, unknown too, the others fall off
+    behind it by the difference of their gains over the temperature (NESTED where they are part of the best cause): they are told
     apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
 
     rough : causes behind which ROUGH_TEMPERATURE holds.
@@ -97,7 +97,6 @@ def judge(
     singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
     pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
     weight: dict[Hypothesis, float] = {("none",): weigh_prior((), catalogue) + nominal.evidence}
-    weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + unknown_evidence
     evidence: dict[Hypothesis, float] = {(name,): nominal.evidence + b for name, b in screened.items()}
     evidence |= {fit.hypothesis: fit.evidence for fit in singles}  # re-simulated, where it was
     evidence |= {fit.hypothesis: fit.evidence for fit in pairs}
@@ -106,12 +105,17 @@ def judge(
     ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
     nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
     temperature = _choose_temperature(ahead, rough)
+    of_unknown = unknown_evidence - nominal.evidence
+    top = max(most, of_unknown)
+    tempered = top - (top - max(of_unknown, 0.0)) / temperature
+    weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + nominal.evidence + tempered + min(of_unknown, 0.0)
+    lead = top - (top - most) / temperature
     for hypothesis, value in gain.items():
         above = max(value, 0.0)
-        tempered = most - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
+        tempered = lead - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
         # what explains less than a part of the best never stands before that part
         behind = [
-            most - (most - part) / NESTED - (part - above) / temperature for part in nested if part >= above
+            lead - (most - part) / NESTED - (part - above) / temperature for part in nested if part >= above
         ]
         tempered = min([tempered, *behind])
         weight[hypothesis] = (

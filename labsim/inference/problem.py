@@ -126,6 +126,8 @@ class Problem:
             entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
             if codes is not None and codes_before is not None:
+                if len(codes) < len(codes_before):  # of scans, at the few speeds alone
+                    codes_before = codes_before[list(self.groups[number].sparse)]
                 own = [
                     spacings(request.sparse, k, False).index(f)
                     for k in range(len(codes))
@@ -196,12 +198,9 @@ class Problem:
         if sparse:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
-        plain = {
-            index: Request("", None, index, sparse, coarse=True) for index in sorted({i for *_, i in wanted})
-        }
+        plain = {index: Request("", None, index, sparse) for index in sorted({i for *_, i in wanted})}
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, sparse, coarse=True)
-            for name, a, index in wanted
+            Request(self._variant(name, a), self.change(name, a), index, sparse) for name, a, index in wanted
         ]
         self.grid.require([*plain.values(), *changed], text)
         for number in range(len(self.groups)):

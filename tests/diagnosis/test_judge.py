@@ -1,11 +1,12 @@
 """What a verdict names beside the first cause."""
 
 import itertools
+import math
 from types import SimpleNamespace
 
 import pytest
 
-from labsim.diagnosis.judge import Verdict, judge
+from labsim.diagnosis.judge import PRIOR_NONE, PRIOR_UNKNOWN, TEMPERATURE, Verdict, judge, weigh_prior
 
 SHEAR, TENSILE, GAS, NONE = ("shear_strength",), ("tensile_strength",), ("pore_gas",), ("none",)
 
@@ -61,3 +62,22 @@ def test_a_cause_is_at_work_alone_or_beside_another():
     verdict = Verdict("effect", [(("rate",), 0.6), (("rate", "gauge"), 0.3), (("none",), 0.1)])
     assert verdict.inclusion == pytest.approx({"rate": 0.9, "gauge": 0.3, "none": 0.1})
     assert verdict.of_first == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("unknown", [-3.0, 0.0, 10.0, 29.0, 31.0, 60.0])
+def test_unknown_is_softened_as_the_causes_are_and_none_counts_in_full(unknown):
+    """A cause that only imitates what nobody listed is a few in ln evidence ahead: two solvers differ by as much."""
+    fits = [
+        SimpleNamespace(hypothesis=("first",), evidence=30.0),
+        SimpleNamespace(hypothesis=("other",), evidence=20.0),
+    ]
+    found = dict(judge(SimpleNamespace(evidence=0.0), fits, unknown, ["first", "other"], {}).probabilities)
+    ahead = math.log(found["first",] / found["unknown",] * PRIOR_UNKNOWN) - weigh_prior(
+        ("first",), ["first", "other"]
+    )
+    expected = (30.0 - max(unknown, 0.0)) / TEMPERATURE - min(unknown, 0.0)
+    assert ahead == pytest.approx(expected)
+    best = max(30.0, unknown)
+    best_is = ("first",) if unknown < 30.0 else ("unknown",)
+    prior = weigh_prior(("first",), ["first", "other"]) if unknown < 30.0 else math.log(PRIOR_UNKNOWN)
+    assert math.log(found[best_is] / found["none",] * PRIOR_NONE) == pytest.approx(best + prior)

@@ -32,8 +32,8 @@ FEWEST_SPEEDS = 3
 # alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, math.sqrt(SPEED_RATIO)
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
-# for what an effect changes, which needs less than what it is added to: from 4 spacings a change of the depth is as near to that
-# from 8 as it is from 5 (benchmarks/accuracy/change_spacing.py). More where fits have more than the usual, in proportion
+# of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more
+# than the usual, in proportion
 COARSE_CELLS = 4
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
@@ -48,12 +48,12 @@ FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
 # (benchmarks/acceleration/effect_roughness.py)
 FELT_STEPS = 4.0
-# of scans, and of what effects change in them: the map needs more than the depth does
+# of scans, and of fingerprints in them: the map needs more than the depth does
 SCAN_CELLS, COARSE_SCAN_CELLS = 8, 6
 SCAN_STEP = 1.15  # from a lone scan's own speed to a second one, which says what its error does to the map
 
 Change = Callable[[DropSetting], DropSetting]
-RunKey = tuple[str, float, bool, bool, int]
+RunKey = tuple[str, float, bool, int]
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ class ProjectileGroup:
     pushed: bool = False
     felt: bool = False
 
-    def positions(self, sparse: bool, coarse: bool) -> Sequence[int]:
+    def positions(self, sparse: bool, changed: bool) -> Sequence[int]:
         """At which speeds a request has runs."""
-        return self.sparse if sparse or (coarse and self.is_scan) else range(len(self.speeds))
+        return self.sparse if sparse or (changed and self.is_scan) else range(len(self.speeds))
 
     def spacings(self, sparse: bool, position: int, changed: bool) -> tuple[float, ...]:
         """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``sparse``), and what
@@ -88,18 +88,17 @@ class ProjectileGroup:
 class Request:
     """Runs of all groups at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    sparse : at the few speeds that fingerprints need. coarse : at the spacing of what effects change, not at that of fits.
+    sparse : of fingerprints, at few speeds and with wider spacings.
     """
 
     variant: str
     change: Change | None
     index: float
     sparse: bool = False
-    coarse: bool = False
 
     def of(self, number: int) -> RunKey:
         """Under what the runs of one group are kept."""
-        return self.variant, self.index, self.sparse, self.coarse, number
+        return self.variant, self.index, self.sparse, number
 
 
 def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
@@ -269,14 +268,14 @@ class RunGrid:
     extension: Change | None = None  # of the nominal model, by a model.toml
     runs: dict[RunKey, list[AnyPart | FailedRun]] = field(default_factory=dict)
 
-    def setting(self, group: ProjectileGroup, speed: float, p_m: float, coarse: bool = False) -> DropSetting:
+    def setting(self, group: ProjectileGroup, speed: float, p_m: float, sparse: bool = False) -> DropSetting:
         """The nominal model of the campaign for one node."""
         usual = self.cells
         if group.felt:
             usual = max(self.cells, FELT_CELLS)
-        elif coarse:
+        elif sparse:
             usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
-        of_scan = COARSE_SCAN_CELLS if coarse else SCAN_CELLS
+        of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
         setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own)
         if group.pushed:
@@ -295,12 +294,12 @@ class RunGrid:
         parts: list[Part] = []
         for request, number in missing:
             group = self.groups[number]
-            positions = group.positions(request.sparse, request.coarse)
             changed = request.variant != ""
+            positions = group.positions(request.sparse, changed)
             laid = [(k, factor) for k in positions for factor in group.spacings(request.sparse, k, changed)]
             for position, factor in laid:
                 setting = self.setting(
-                    group, group.speeds[position], strength_node(request.index), request.coarse
+                    group, group.speeds[position], strength_node(request.index), request.sparse
                 )
                 setting = request.change(setting) if request.change is not None else setting
                 setting = setting.replace(spacing=factor * setting.spacing)
