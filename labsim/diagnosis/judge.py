@@ -8,17 +8,18 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
 
 from ..inference.fits.fitting import Fit, Hypothesis
 
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1
 PRIOR_PAIRS = 0.1  # all pairs together
-# among causes and unknown: what tells one from another rests on details in which two solvers differ. And behind a cause that
-# changes runs which accelerometers feel: what it changes of a force is as rough as that is
-TEMPERATURE, ROUGH_TEMPERATURE = 4.0, 10.0
-# of a single behind a pair that contains it: on fifty campaigns of two other solvers a second effect that was not there gained at
-# most 5.5, the weakest that was 9.6
+# among causes: what tells one from another rests on details in which two solvers differ (benchmarks/accuracy/fit_exponent.py);
+# and behind one that changes runs which accelerometers feel: what it changes of a force is as rough as that is
+TEMPERATURE, ROUGH_TEMPERATURE = 3.0, 10.0
+# of what holds less or more than the best cause: a part of a pair, and unknown. On fifty campaigns of two other solvers a second
+# effect that was not there gained at most 5.5, the weakest that was 9.6
 NESTED = 2.0
 # p value of the best cause's held-out drops, or of its own data, below which what is not listed gets the odds that it allows
 PREDICTED = 0.05
@@ -84,9 +85,9 @@ def judge(
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
-    What explains most counts in full against none. Among those that explain more than none, unknown too, the others fall off
-    behind it by the difference of their gains over the temperature (NESTED where they are part of the best cause): they are told
-    apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
+    None has what the evidences give it against all others. These share the rest: behind what explains most they fall off by the
+    difference of their gains over the temperature (NESTED for unknown and for parts of the best), since they are told apart by
+    residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
 
     rough : causes behind which ROUGH_TEMPERATURE holds.
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
@@ -96,41 +97,44 @@ def judge(
     """
     singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
     pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
-    weight: dict[Hypothesis, float] = {("none",): weigh_prior((), catalogue) + nominal.evidence}
     evidence: dict[Hypothesis, float] = {(name,): nominal.evidence + b for name, b in screened.items()}
     evidence |= {fit.hypothesis: fit.evidence for fit in singles}  # re-simulated, where it was
     evidence |= {fit.hypothesis: fit.evidence for fit in pairs}
     gain = {hypothesis: value - nominal.evidence for hypothesis, value in evidence.items()}
+    of_unknown = unknown_evidence - nominal.evidence
+    full = [weigh_prior(hypothesis, catalogue) + value for hypothesis, value in gain.items()]
+    full.append(math.log(PRIOR_UNKNOWN) + of_unknown)
     most = max([0.0, *gain.values()])
+    top = max(most, of_unknown)
+    lead = top - (top - most) / NESTED
     ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
     nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
     temperature = _choose_temperature(ahead, rough)
-    of_unknown = unknown_evidence - nominal.evidence
-    top = max(most, of_unknown)
-    tempered = top - (top - max(of_unknown, 0.0)) / temperature
-    weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + nominal.evidence + tempered + min(of_unknown, 0.0)
-    lead = top - (top - most) / temperature
+    softened = top - (top - max(of_unknown, 0.0)) / NESTED
+    weight: dict[Hypothesis, float] = {
+        ("unknown",): math.log(PRIOR_UNKNOWN) + softened + min(of_unknown, 0.0)
+    }
     for hypothesis, value in gain.items():
         above = max(value, 0.0)
-        tempered = lead - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
+        softened = lead - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
         # what explains less than a part of the best never stands before that part
         behind = [
             lead - (most - part) / NESTED - (part - above) / temperature for part in nested if part >= above
         ]
-        tempered = min([tempered, *behind])
-        weight[hypothesis] = (
-            weigh_prior(hypothesis, catalogue) + nominal.evidence + tempered + min(value, 0.0)
-        )
+        softened = min([softened, *behind])
+        weight[hypothesis] = weigh_prior(hypothesis, catalogue) + softened + min(value, 0.0)
     if predicted < PREDICTED:
         predicted = max(predicted, sys.float_info.min)  # that of a bad misfit rounds to nought
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
         first = max(weight[hypothesis] for hypothesis in gain)
         weight[("unknown",)] = max(weight[("unknown",)], first + odds)
-    top = max(weight.values())
-    total = sum(math.exp(value - top) for value in weight.values())
+    spread = logsumexp(full) - logsumexp(list(weight.values()))
+    weight = {hypothesis: value + spread for hypothesis, value in weight.items()}
+    weight[("none",)] = weigh_prior((), catalogue)
+    total = logsumexp(list(weight.values()))
     ranked = sorted(
-        ((name, math.exp(value - top) / total) for name, value in weight.items()), key=lambda item: -item[1]
+        ((name, math.exp(value - total)) for name, value in weight.items()), key=lambda item: -item[1]
     )
     best = ranked[0][0]
     word = best[0] if best in (("none",), ("unknown",)) else "effect"

@@ -70,14 +70,16 @@ def test_probabilities_follow_bayes():
     catalogue = ["a", "b", "c", "d"]
     verdict = judge(fake_fit((), 0.0), [fake_fit(("a",), 3.0)], -1.0, catalogue, {"b": 0.5, "c": -2.0})
     share = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4
+    something = share * (math.exp(3) + math.exp(0.5) + math.exp(-2)) + 0.1 * math.exp(-1)  # by the evidences
     weight = {
-        ("none",): 0.5,
         ("a",): share * math.exp(3),
         ("b",): share * math.exp(3 - (3 - 0.5) / TEMPERATURE),  # gains count a share of their difference
         ("c",): share * math.exp(3 - 3 / TEMPERATURE - 2),  # losses in full
-        ("unknown",): 0.1 * math.exp(3 - 3 / TEMPERATURE - 1),
+        ("unknown",): 0.1 * math.exp(3 - 3 / NESTED - 1),
     }
-    total = sum(weight.values())
+    shared = sum(weight.values())
+    weight = {name: value * something / shared for name, value in weight.items()} | {("none",): 0.5}
+    total = 0.5 + something
     for hypothesis, probability in verdict.probabilities:
         assert probability == pytest.approx(weight[hypothesis] / total, rel=1e-12)
     assert verdict.word == "effect"
@@ -99,7 +101,7 @@ def test_a_cause_that_does_not_predict_held_out_drops_stands_back_behind_unknown
         assert found["unknown",] / found["a",] == pytest.approx(odds)
     else:
         share = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4
-        odds = 0.1 / share * math.exp(-90.0 / TEMPERATURE - 1.0)
+        odds = 0.1 / share * math.exp(-90.0 / NESTED - 1.0)
         assert found["unknown",] / found["a",] == pytest.approx(odds)
     assert sum(found.values()) == pytest.approx(1.0)
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from labsim.diagnosis.judge import PRIOR_NONE, PRIOR_UNKNOWN, TEMPERATURE, Verdict, judge, weigh_prior
+from labsim.diagnosis.judge import NESTED, PRIOR_NONE, PRIOR_UNKNOWN, Verdict, judge, weigh_prior
 
 SHEAR, TENSILE, GAS, NONE = ("shear_strength",), ("tensile_strength",), ("pore_gas",), ("none",)
 
@@ -65,19 +65,25 @@ def test_a_cause_is_at_work_alone_or_beside_another():
 
 
 @pytest.mark.parametrize("unknown", [-3.0, 0.0, 10.0, 29.0, 31.0, 60.0])
-def test_unknown_is_softened_as_the_causes_are_and_none_counts_in_full(unknown):
+def test_unknown_is_softened_as_a_part_of_a_pair_is_and_none_counts_in_full(unknown):
     """A cause that only imitates what nobody listed is a few in ln evidence ahead: two solvers differ by as much."""
-    fits = [
-        SimpleNamespace(hypothesis=("first",), evidence=30.0),
-        SimpleNamespace(hypothesis=("other",), evidence=20.0),
-    ]
-    found = dict(judge(SimpleNamespace(evidence=0.0), fits, unknown, ["first", "other"], {}).probabilities)
-    ahead = math.log(found["first",] / found["unknown",] * PRIOR_UNKNOWN) - weigh_prior(
-        ("first",), ["first", "other"]
-    )
-    expected = (30.0 - max(unknown, 0.0)) / TEMPERATURE - min(unknown, 0.0)
-    assert ahead == pytest.approx(expected)
-    best = max(30.0, unknown)
-    best_is = ("first",) if unknown < 30.0 else ("unknown",)
-    prior = weigh_prior(("first",), ["first", "other"]) if unknown < 30.0 else math.log(PRIOR_UNKNOWN)
-    assert math.log(found[best_is] / found["none",] * PRIOR_NONE) == pytest.approx(best + prior)
+    gains, catalogue = {"first": 30.0, "other": 20.0}, ["first", "other"]
+    fits = [SimpleNamespace(hypothesis=(name,), evidence=gain) for name, gain in gains.items()]
+    found = dict(judge(SimpleNamespace(evidence=0.0), fits, unknown, catalogue, {}).probabilities)
+    prior = {name: weigh_prior((name,), catalogue) for name in catalogue}
+    ahead = math.log(found["first",] / found["unknown",] * PRIOR_UNKNOWN) - prior["first"]
+    assert ahead == pytest.approx((30.0 - max(unknown, 0.0)) / NESTED - min(unknown, 0.0))
+    full = sum(math.exp(prior[name] + gain) for name, gain in gains.items())
+    full += PRIOR_UNKNOWN * math.exp(unknown)
+    assert found["none",] == pytest.approx(PRIOR_NONE / (PRIOR_NONE + full))
+
+
+def test_causes_that_explain_nothing_take_nothing_from_none():
+    """Twenty of them beside one that explains little: they share what is left beside none, however little that one explains."""
+    causes = [f"cause {k}" for k in range(20)]
+    fits = [SimpleNamespace(hypothesis=(name,), evidence=2.8 * (k == 0)) for k, name in enumerate(causes)]
+    found = dict(judge(SimpleNamespace(evidence=0.0), fits, -0.2, causes, {}).probabilities)
+    prior = math.exp(weigh_prior(("cause 0",), causes))
+    full = prior * (math.exp(2.8) + 19) + PRIOR_UNKNOWN * math.exp(-0.2)
+    assert found["none",] == pytest.approx(PRIOR_NONE / (PRIOR_NONE + full))
+    assert found["none",] > max(value for name, value in found.items() if name != ("none",))
