@@ -16,6 +16,13 @@ from labsim.tracks import find_format
 from labsim.video import open_frames
 
 P01 = Path(__file__).parents[1] / "data" / "campaigns" / "p01"
+OBSERVATION = """
+from types import SimpleNamespace
+
+def observe(campaign):
+    asked = dict.fromkeys(("begin", "linearise", "follow"), print)
+    return SimpleNamespace(name=campaign.name, kind="scale", features=(), **asked)
+"""
 EFFECT = (Path(labsim.__file__).parent / "effects/catalogue/projectile_mass.py").read_text()
 
 
@@ -50,7 +57,7 @@ def test_formats_effects_and_measurements_of_a_package_join(install, tmp_path):
             "rows": 'NAME = "rows"\ndef recognises(path):\n    return path.suffix == ".rows"\n',
             "camera": 'NAME = "camera"\ndef recognises(path):\n    raise RuntimeError("asked")\n',
             "heavier": EFFECT,
-            "scale": "def observe(campaign):\n    return campaign.name\n",
+            "scale": OBSERVATION,
         },
         {
             "track_formats": {"rows": "instruments.rows"},
@@ -68,7 +75,7 @@ def test_formats_effects_and_measurements_of_a_package_join(install, tmp_path):
     effect = list_effects()["heavier"]
     assert effect.name == "heavier" and effect.file.parent.name == "instruments"
 
-    assert observe_further(read_campaign(P01)) == ["p01"]
+    assert [each.name for each in observe_further(read_campaign(P01))] == ["p01"]
 
 
 @pytest.mark.parametrize(

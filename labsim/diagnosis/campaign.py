@@ -41,7 +41,7 @@ from ..runs.store import Progress, RunStore
 from .average import average_p_m
 from .explore import EXPLORED, explore, needs_exploration
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
-from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
+from .judge import NESTED, PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, refine_leading, return_to_singles
 from .screen import CLOSE, Score, Screening, has_runs, list_confusable, screen
@@ -150,9 +150,9 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
     predicted = 1.0
     if p_value < REJECTED and rivals:
         predicted = check_leading(problem, leading, np.random.default_rng(seed))
-    if not any(group.pushed for group in problem.groups) and needs_free_law(
-        p_value, rivals, unknown.evidence, predicted
-    ):  # the laws without a name are those of drops
+    pushed = any(group.pushed for group in problem.groups)
+    # the laws without a name are those of drops
+    if not pushed and needs_free_law(p_value, rivals, unknown.evidence, predicted):
         unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal))
     verdict = judge(
         nominal,
@@ -162,6 +162,7 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
         {score.name: score.log_bayes for score in screening.scores},
         predicted,
         _list_rough(problem),
+        1.0 if pushed or problem.felt else NESTED,  # that was measured on films
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it

@@ -82,12 +82,14 @@ def judge(
     screened: Mapping[str, float],
     predicted: float = 1.0,
     rough: Collection[str] = (),
+    unknown_softness: float = NESTED,
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
     None has what the evidences give it against all others. These share the rest: behind what explains most they fall off by the
-    difference of their gains over the temperature (NESTED for unknown and for parts of the best), since they are told apart by
-    residuals of the size of the solver's own error. Of two singles the one with more evidence always stands first.
+    difference of their gains over the temperature (NESTED for parts of the best, ``unknown_softness`` for unknown), since they
+    are told apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands
+    first.
 
     rough : causes behind which ROUGH_TEMPERATURE holds.
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
@@ -106,11 +108,11 @@ def judge(
     full.append(math.log(PRIOR_UNKNOWN) + of_unknown)
     most = max([0.0, *gain.values()])
     top = max(most, of_unknown)
-    lead = top - (top - most) / NESTED
+    lead = top - (top - most) / unknown_softness
     ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
     nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
     temperature = _choose_temperature(ahead, rough)
-    softened = top - (top - max(of_unknown, 0.0)) / NESTED
+    softened = top - (top - max(of_unknown, 0.0)) / unknown_softness
     weight: dict[Hypothesis, float] = {
         ("unknown",): math.log(PRIOR_UNKNOWN) + softened + min(of_unknown, 0.0)
     }
