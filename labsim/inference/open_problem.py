@@ -24,7 +24,6 @@ from .emulation.grid import (
     ProjectileGroup,
     RunGrid,
     own_speeds,
-    scan_speeds,
     sparse_positions,
     speed_nodes,
 )
@@ -126,7 +125,8 @@ def open_problem(
         observations.append(SleeveFriction(tuple(sleeves)))
     zones = []
     for projectile, scanned in group_alike((scan.scan.projectile, scan) for scan in scans).items():
-        nodes, sparse = scan_speeds([scan.scan.speed.value for scan in scanned])
+        nodes = own_speeds([scan.scan.speed.value for scan in scanned])
+        sparse = tuple(range(len(nodes)))
         for scan in scanned:
             encode = partial(encode_scan_run, observed=scan)
             own = RunFeatures(len(groups), ResponseTable(np.log(nodes), sparse), encode)

@@ -126,8 +126,6 @@ class Problem:
             entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
             if codes is not None and codes_before is not None:
-                if len(codes) < len(codes_before):  # of scans, at the few speeds alone
-                    codes_before = codes_before[list(self.groups[number].sparse)]
                 own = [
                     spacings(request.sparse, k, False).index(f)
                     for k in range(len(codes))

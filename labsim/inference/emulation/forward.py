@@ -28,8 +28,8 @@ Changes = dict[float, dict[float, FloatArray]]
 @dataclass
 class ResponseTable:
     """Codes of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
-    where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds, or at
-    the few. fingerprints : the same at the few speeds, taken where there are no changes. parameters : of effects whose amplitudes
+    where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds.
+    fingerprints : the same at the few speeds, taken where there are no changes. parameters : of effects whose amplitudes
     have a grade of their own."""
 
     log_speeds: FloatArray
@@ -95,14 +95,14 @@ class Response:
 
     def change(self, name: str, amplitude: float) -> FloatArray:
         """What an effect adds to the code, (m,)."""
-        runs = self.table.changes[name] if name in self.table.changes else self.table.fingerprints[name]
+        if name in self.table.changes:
+            runs, across = self.table.changes[name], self.across
+        else:
+            sparse = self.table.log_speeds[list(self.table.sparse)]
+            runs, across = self.table.fingerprints[name], interpolation_weights(sparse, self.log_speed)
         indices = [index for index in runs if runs[index]]
         if not indices:
             raise ExtrapolationError("simulation", name, "every run with it failed; see labsim runs")
-        across = self.across
-        if len(next(iter(runs[indices[0]].values()))) < across.size:
-            sparse = self.table.log_speeds[list(self.table.sparse)]
-            across = interpolation_weights(sparse, self.log_speed)
         nodes = _log_strengths(indices)
         margin = 0.5 * math.log(STRENGTH_RATIO)
         inside = min(max(self.log_p_m, min(nodes) - margin), max(nodes) + margin)

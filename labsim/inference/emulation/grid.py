@@ -27,9 +27,9 @@ SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
 FEWEST_SPEEDS = 3
-# of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time is off by up
-# to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Drops nearer than SAME_SPEED share a node, one
-# alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
+# of scans and of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time
+# is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
+# node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, math.sqrt(SPEED_RATIO)
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 # of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more
@@ -50,7 +50,6 @@ FELT_SPACINGS = (0.975, 1.025)
 FELT_STEPS = 4.0
 # of scans, and of fingerprints in them: the map needs more than the depth does
 SCAN_CELLS, COARSE_SCAN_CELLS = 8, 6
-SCAN_STEP = 1.15  # from a lone scan's own speed to a second one, which says what its error does to the map
 
 Change = Callable[[DropSetting], DropSetting]
 RunKey = tuple[str, float, bool, int]
@@ -60,9 +59,8 @@ RunKey = tuple[str, float, bool, int]
 class ProjectileGroup:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
-    sparse : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change; of
-    scans, which have a speed of their own, all that effects change. pushed : led through the ground at these speeds, not
-    dropped. felt : an accelerometer is on some of them.
+    sparse : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change. pushed :
+    led through the ground at these speeds, not dropped. felt : an accelerometer is on some of them.
     """
 
     projectile: Projectile
@@ -71,10 +69,6 @@ class ProjectileGroup:
     sparse: tuple[int, ...]
     pushed: bool = False
     felt: bool = False
-
-    def positions(self, sparse: bool, changed: bool) -> Sequence[int]:
-        """At which speeds a request has runs."""
-        return self.sparse if sparse or (changed and self.is_scan) else range(len(self.speeds))
 
     def spacings(self, sparse: bool, position: int, changed: bool) -> tuple[float, ...]:
         """Factors on the usual spacing of which there is a run each at one of the speeds; fingerprints (``sparse``), and what
@@ -115,24 +109,7 @@ def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> t
 
 
 def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
-    """Nodes at the speeds of drops with an accelerometer, of three digits, at least two of them."""
-    nodes = _merge_speeds(speeds)
-    if len(nodes) == 1:
-        nodes = [nodes[0] / SAME_SPEED, nodes[0] * SAME_SPEED]
-    return tuple(float(f"{node:.3g}") for node in nodes)
-
-
-def scan_speeds(speeds: Sequence[float]) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Nodes at the speeds of scans, of three digits, at least two of them; and those that effects are simulated at."""
-    nodes = _merge_speeds(speeds)
-    sparse = range(len(nodes))
-    if len(nodes) == 1:
-        nodes = [nodes[0], nodes[0] * SCAN_STEP]
-    return tuple(float(f"{node:.3g}") for node in nodes), tuple(sparse)
-
-
-def _merge_speeds(speeds: Sequence[float]) -> list[float]:
-    """One speed for all that are alike; nodes of a grid where there are many."""
+    """Nodes at the speeds of drops with an accelerometer or of scans, of three digits, at least two of them."""
     alike: list[list[float]] = []
     for speed in sorted(speeds):
         if alike and speed < SAME_SPEED * alike[-1][0]:
@@ -140,8 +117,11 @@ def _merge_speeds(speeds: Sequence[float]) -> list[float]:
         else:
             alike.append([speed])
     if len(alike) > MOST_SPEEDS:
-        return list(speed_nodes(min(speeds), max(speeds), FELT_RATIO))
-    return [math.sqrt(each[0] * each[-1]) for each in alike]
+        return speed_nodes(min(speeds), max(speeds), FELT_RATIO)
+    nodes = [math.sqrt(each[0] * each[-1]) for each in alike]
+    if len(nodes) == 1:
+        nodes = [nodes[0] / SAME_SPEED, nodes[0] * SAME_SPEED]
+    return tuple(float(f"{node:.3g}") for node in nodes)
 
 
 def sparse_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
@@ -295,7 +275,7 @@ class RunGrid:
         for request, number in missing:
             group = self.groups[number]
             changed = request.variant != ""
-            positions = group.positions(request.sparse, changed)
+            positions = group.sparse if request.sparse else range(len(group.speeds))
             laid = [(k, factor) for k in positions for factor in group.spacings(request.sparse, k, changed)]
             for position, factor in laid:
                 setting = self.setting(
