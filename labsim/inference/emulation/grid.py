@@ -59,8 +59,8 @@ RunKey = tuple[str, float, bool, int]
 class ProjectileGroup:
     """Drops (or scans) with one projectile, and the speeds they are simulated at. speeds : (k,) m/s, rising.
 
-    sparse : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change. pushed :
-    led through the ground at these speeds, not dropped. felt : an accelerometer is on some of them.
+    sparse : positions among them at which fingerprints of effects are simulated, smoother in speed than what they change.
+    pushed : led through the ground at these speeds, not dropped. felt : an accelerometer is on some of them.
     """
 
     projectile: Projectile
