@@ -37,8 +37,8 @@ def find_fingerprints(campaign: Campaign, spacings: int, count: int) -> tuple[di
     factors = tuple(
         grid.FELT_CELLS / spacings * each for each in (grid.FELT_SPACINGS if count == 2 else (1.0,))
     )
-    grid.ProjectileGroup.spacings = lambda group, cells, *rest: (  # type: ignore[method-assign]
-        USUAL(group, cells, *rest) if cells is None else factors
+    grid.ProjectileGroup.spacings = lambda group, sparse, *rest: (  # type: ignore[method-assign]
+        factors if sparse else USUAL(group, sparse, *rest)
     )
     with tempfile.TemporaryDirectory() as folder:
         problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))

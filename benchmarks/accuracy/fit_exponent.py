@@ -18,6 +18,7 @@ from types import SimpleNamespace
 
 import pandas as pd
 
+from benchmarks.accuracy.blind import name_hypothesis
 from labsim.diagnosis import judge
 
 EXPONENTS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
@@ -45,7 +46,7 @@ def judge_again(row: dict, temperature: float) -> dict[str, float]:
         found["screened"],
         found["predicted"],
     )
-    return {" + ".join(sorted(causes)): probability for causes, probability in verdict.probabilities}
+    return {name_hypothesis(causes): probability for causes, probability in verdict.probabilities}
 
 
 def main(paths: list[Path]) -> None:
@@ -55,7 +56,7 @@ def main(paths: list[Path]) -> None:
         right = wrong = 0
         surprise = 0.0
         for row in rows:
-            hidden = " + ".join(sorted(row["hidden"].split(" + ")))
+            hidden = name_hypothesis(row["hidden"].split(" + "))
             found = judge_again(row, temperature)
             first, probability = next(iter(found.items()))
             right += first == hidden

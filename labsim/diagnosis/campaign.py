@@ -150,9 +150,8 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
     predicted = 1.0
     if p_value < REJECTED and rivals:
         predicted = check_leading(problem, leading, np.random.default_rng(seed))
-    pushed = any(group.pushed for group in problem.groups)
     # the laws without a name are those of drops
-    if not pushed and needs_free_law(p_value, rivals, unknown.evidence, predicted):
+    if not problem.pushed and needs_free_law(p_value, rivals, unknown.evidence, predicted):
         unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal))
     verdict = judge(
         nominal,
@@ -162,7 +161,7 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
         {score.name: score.log_bayes for score in screening.scores},
         predicted,
         _list_rough(problem),
-        1.0 if pushed or problem.felt else NESTED,  # that was measured on films
+        1.0 if problem.pushed or problem.felt else NESTED,  # that was measured on films
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it
@@ -184,7 +183,7 @@ def judge_scatters(
 ) -> Judgement:
     """Judge with the least scatter of samples, or with the larger one that the nominal model or the leading cause asks for.
 
-    open_with : a problem and its nominal fit for given error budget. A larger scatter is taken where the model that asks for it
+    open_with : a problem and its nominal fit for a given error budget. A larger scatter is taken where the model that asks for it
     stands, with its prior and its evidence, before all that was found with the least one. The nominal model is asked first: where
     it stands before all that may be found at all, nothing is looked for with the least one.
     """

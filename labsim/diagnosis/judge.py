@@ -18,8 +18,8 @@ PRIOR_PAIRS = 0.1  # all pairs together
 # among causes: what tells one from another rests on details in which two solvers differ (benchmarks/accuracy/fit_exponent.py);
 # and behind one that changes runs which accelerometers feel: what it changes of a force is as rough as that is
 TEMPERATURE, ROUGH_TEMPERATURE = 3.0, 10.0
-# of what holds less or more than the best cause: a part of a pair, and unknown. On fifty campaigns of two other solvers a second
-# effect that was not there gained at most 5.5, the weakest that was 9.6
+# of a part of the best pair, and of unknown, a cause with more freedom than any listed one. On fifty campaigns of two other
+# solvers a second effect that was not there gained at most 5.5, the weakest that was 9.6
 NESTED = 2.0
 # p value of the best cause's held-out drops, or of its own data, below which what is not listed gets the odds that it allows
 PREDICTED = 0.05
@@ -91,18 +91,15 @@ def judge(
     are told apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands
     first.
 
-    rough : causes behind which ROUGH_TEMPERATURE holds.
+    rough : causes behind which ROUGH_TEMPERATURE holds. unknown_softness : by which what unknown and the best cause differ by is
+    divided.
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
     p value of held-out drops with the best cause, or of its own data. Where they are missed, unknown stands to that cause at
     least as its prior does to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p):
     Sellke et al. (2001).
     """
-    singles = [fit for fit in rivals if len(fit.hypothesis) == 1]
-    pairs = [fit for fit in rivals if len(fit.hypothesis) == 2]
-    evidence: dict[Hypothesis, float] = {(name,): nominal.evidence + b for name, b in screened.items()}
-    evidence |= {fit.hypothesis: fit.evidence for fit in singles}  # re-simulated, where it was
-    evidence |= {fit.hypothesis: fit.evidence for fit in pairs}
-    gain = {hypothesis: value - nominal.evidence for hypothesis, value in evidence.items()}
+    gain: dict[Hypothesis, float] = {(name,): gained for name, gained in screened.items()}
+    gain |= {fit.hypothesis: fit.evidence - nominal.evidence for fit in rivals}  # re-simulated, where it was
     of_unknown = unknown_evidence - nominal.evidence
     full = [weigh_prior(hypothesis, catalogue) + value for hypothesis, value in gain.items()]
     full.append(math.log(PRIOR_UNKNOWN) + of_unknown)

@@ -78,6 +78,11 @@ class Problem:
         return any(group.felt for group in self.groups)
 
     @property
+    def pushed(self) -> bool:
+        """Whether projectiles are led through the ground, not dropped."""
+        return any(group.pushed for group in self.groups)
+
+    @property
     def node_step(self) -> float:
         """Between the strengths at which runs are made, in nodes of the grid. A depth is smooth in ln p_m; the force that an
         accelerometer feels is off by 1 to 2 % of its largest between nodes a factor of two apart."""
@@ -113,13 +118,11 @@ class Problem:
             if codes is not None:
                 table.base[index] = codes.mean(axis=1)
 
-    def _fill_change(
-        self, number: int, request: Request, plain: Request, name: str, amplitude: float
-    ) -> None:
+    def _fill_change(self, number: int, request: Request, name: str, amplitude: float) -> None:
         if request.of(number) in self._filled:
             return
         self._filled.add(request.of(number))
-        before, after = self._encode_plain(number, plain), self._encode(number, request)
+        before, after = self._encode_plain(number, request.plain), self._encode(number, request)
         spacings = self.groups[number].spacings  # a change is one from the run of the same spacing
         for (table, codes), (_, codes_before) in zip(after, before, strict=True):
             kept = table.fingerprints if request.sparse else table.changes
@@ -196,14 +199,14 @@ class Problem:
         if sparse:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
-        plain = {index: Request("", None, index, sparse) for index in sorted({i for *_, i in wanted})}
         changed = [
             Request(self._variant(name, a), self.change(name, a), index, sparse) for name, a, index in wanted
         ]
-        self.grid.require([*plain.values(), *changed], text)
+        plain = sorted({request.plain for request in changed}, key=lambda request: request.index)
+        self.grid.require([*plain, *changed], text)
         for number in range(len(self.groups)):
-            for (name, amplitude, index), request in zip(wanted, changed, strict=True):
-                self._fill_change(number, request, plain[index], name, amplitude)
+            for (name, amplitude, _), request in zip(wanted, changed, strict=True):
+                self._fill_change(number, request, name, amplitude)
 
     def require_fingerprints(self, names: Sequence[str], log_p_m: float, text: str) -> None:
         """The base about a strength, and what each effect changes there by one step; by a step to the other side of its null

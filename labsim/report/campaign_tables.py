@@ -78,14 +78,9 @@ def say_calibrated(campaign: Campaign, value: float) -> str:
     return f"{value * factor:.3g} {unit}"
 
 
-def is_pushed(problem: Problem) -> bool:
-    """Whether the records are those of pushes."""
-    return any(group.pushed for group in problem.groups)
-
-
 def say_records(problem: Problem) -> str:
     """``drops`` or ``pushes``."""
-    return "pushes" if is_pushed(problem) else "drops"
+    return "pushes" if problem.pushed else "drops"
 
 
 def say_count(problem: Problem) -> str:
@@ -164,7 +159,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             cause["free_law"] = describe_unknown(found)
         causes.append(cause)
     gain = found.gain
-    unit = "" if is_pushed(found.problem) else "_m"  # of a push what is left is relative
+    unit = "" if found.problem.pushed else "_m"  # of a push what is left is relative
     return {
         "format": 1,
         "campaign": found.campaign.name,
@@ -355,7 +350,7 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         low, high = np.quantile(found.p_m_averaged, [0.05, 0.95]) * factor
         lines.append(f"  {label} whichever of these is at work: {low:.2f} to {high:.2f} {unit} (90 %)")
     gain = found.gain
-    shown, of_shown = (100.0, "%") if is_pushed(found.problem) else (1e6, "µm")
+    shown, of_shown = (100.0, "%") if found.problem.pushed else (1e6, "µm")
     nearest = "the nearest listed cause, " if found.verdict.word == "unknown" else ""
     lines.append(
         f"  held-out {say_records(found.problem)}: rms {gain.rms_nominal * shown:.1f} {of_shown} nominal, "

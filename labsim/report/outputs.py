@@ -26,7 +26,6 @@ from .campaign_tables import (
     campaign_diagnosis_lines,
     campaign_diagnosis_summary,
     extended_model,
-    is_pushed,
     state_numerical_error,
 )
 from .figures import campaign as figures
@@ -97,7 +96,7 @@ def _suggest(found: Diagnosis) -> list[Suggestion]:
 def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
     """Every drop measured and simulated, and below it what is left; of pushes all at once and their misfit. Pairs of axes."""
     fits = list_fits(found)
-    if is_pushed(found.problem):
+    if found.problem.pushed:
         pushes = view_pushes(found.problem, fits)
         drawn = plt.figure(figsize=(12.0, 4.6), layout="constrained") if figure is None else figure
         left, right = drawn.subplots(1, 2)
@@ -113,7 +112,7 @@ def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> t
     summary = campaign_calibration_summary(found)
     write_json(folder / "calibration.json", summary)
     _write_posterior(found.posterior, folder)
-    if is_pushed(found.problem):
+    if found.problem.pushed:
         write_push_calibration(found, folder)
         return summary, campaign_calibration_lines(found)
     figures.draw_posterior(found.posterior, folder / "corner.png")
@@ -130,7 +129,7 @@ def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple
     write_json(folder / "diagnosis.json", summary)
     write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
     _write_posterior(found.posterior_extended, folder)
-    if is_pushed(found.problem):
+    if found.problem.pushed:
         write_push_diagnosis(found, summary, suggestions, folder)
         return summary, campaign_diagnosis_lines(found, suggestions)
     fits = list_fits(found)

@@ -90,6 +90,11 @@ class Request:
     index: float
     sparse: bool = False
 
+    @property
+    def plain(self) -> Request:
+        """The same runs of the nominal model."""
+        return replace(self, variant="", change=None)
+
     def of(self, number: int) -> RunKey:
         """Under what the runs of one group are kept."""
         return self.variant, self.index, self.sparse, number

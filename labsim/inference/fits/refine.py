@@ -19,7 +19,7 @@ MOVED = 0.5  # of its standard deviation, that asks for them once more
 def list_large_effects(problem: Problem, fit: Fit) -> list[str]:
     """Effects of a fit that change runs and are larger than LARGE, or change more of a record than LARGE_CHANGE where runs are
     rough; not those of the numerics, whose runs cost too much."""
-    if any(group.pushed for group in problem.groups):
+    if problem.pushed:
         return []  # what a rate changes of a push is smooth, and runs of amplitudes near each other differ by noise
     return [
         name
