@@ -241,7 +241,7 @@ def diagnose_campaign(
     """Measure and calibrate, judge_campaign, and what follows from it: gain on held-out drops, posteriors without and with the
     extension."""
     began = time.perf_counter()
-    seen = measurements or measure(campaign)
+    seen = measurements or measure(campaign, workers=workers)
 
     def open_with(budget: ErrorBudget) -> tuple[Problem, Fit]:
         return prepare(

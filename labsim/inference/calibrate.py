@@ -78,7 +78,7 @@ def prepare(
     model: Model | None = None,
 ) -> tuple[Problem, Fit]:
     """Measure the campaign (where that has not been done) and fit the nominal model."""
-    seen = measurements or measure(campaign)
+    seen = measurements or measure(campaign, workers=workers)
     effects = list_effects(campaign.folder)
     problem = open_problem(
         campaign,

@@ -21,12 +21,13 @@ class Measurements:
     warnings: list[str] = field(default_factory=list)
 
 
-def measure(campaign: Campaign) -> Measurements:
+def measure(campaign: Campaign, *, workers: int | None = 1) -> Measurements:
     """Read tracks, track videos, reduce scans. A drop or scan that shows nothing is left out with a warning.
 
-    Raises MeasurementError where no drop is left.
+    workers : processes for tracks and videos; None for one a core.
+    Raises MeasurementError where no drop is left, InferenceError where a worker dies.
     """
-    drops, warnings = observe_drops(campaign)
+    drops, warnings = observe_drops(campaign, workers=workers)
     seen = Measurements(drops, warnings=warnings)
     for scan in campaign.scans:
         try:

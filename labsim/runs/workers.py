@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 from ..errors import InferenceError, LabsimError
@@ -146,10 +147,10 @@ def open_executor(
     if min(count, wanted) <= 1:
         yield InProcess(), 1
         return
+    if compile_first:
+        warm_up()  # once here, or every worker would
     pool = _pools.get(count)
     if pool is None:
-        if compile_first:
-            warm_up()  # once here, or every worker would
         pool = _pools[count] = ProcessWorkers(count)
     try:
         yield pool, count + 1
@@ -162,6 +163,7 @@ def open_executor(
 _pools: dict[int, ProcessWorkers] = {}  # kept from sweep to sweep: a fit asks for many small ones
 
 
+@cache
 def warm_up() -> None:
     """Compile the solver into its cache by a drop of a few steps."""
     cylinder = Projectile(tip="cylinder", tip_radius=5.0e-4, mass=2.0e-3)

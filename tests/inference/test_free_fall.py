@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import laws
+import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
@@ -99,3 +100,11 @@ def test_calibrate_and_diagnose_say_it_before_their_result(tmp_path):
     summary, lines = write_result(found, tmp_path / "out")
     assert any("free fall shows g" in text for text in summary["warnings"][: found.doubts])
     assert "free fall shows g" in lines.split("probability  cause")[0]
+
+
+def test_two_workers_measure_what_one_does(campaign):
+    one, two = (observe_drops(campaign, workers=workers) for workers in (1, 2))
+    assert [drop.name for drop in two[0]] == list(FEW) and one[1] == two[1]
+    for here, there in zip(one[0], two[0], strict=True):
+        assert here.curve.penetration_depth == there.curve.penetration_depth
+        np.testing.assert_array_equal(here.depth, there.depth)

@@ -6,12 +6,14 @@ which frames belong to the motion, and where the search for contact time and imp
 
 from __future__ import annotations
 
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import MeasurementError
 from ...records import Campaign, DecelerationCurve, Drop, FloatArray, Track
+from ...runs.workers import explain_loss, open_executor
 from ...video.motion.curve import fit_deceleration
 from ...video.track_file import read_track
 from .observe_acceleration import ObservedImpact, observe_impact
@@ -118,25 +120,33 @@ def read_observed_track(drop: Drop) -> Track:
     )
 
 
-def observe_drops(campaign: Campaign) -> tuple[list[Observed], list[str]]:
+def _observe_filmed(drop: Drop) -> ObservedDrop:
+    return observe_drop(drop, read_observed_track(drop))
+
+
+def observe_drops(campaign: Campaign, *, workers: int | None = 1) -> tuple[list[Observed], list[str]]:
     """Every drop that shows something; a line for each that does not, and for each thing that its track warns of.
 
-    Raises MeasurementError where none does: the first one's.
+    workers : processes that films and tracks are measured on; None for one a core.
+    Raises MeasurementError where no drop shows anything: the first one's; InferenceError where a worker dies.
     """
     seen: list[Observed] = []
     failures: list[tuple[str, MeasurementError]] = []
-    for drop in campaign.drops:
-        if drop.record.kind == "summary":
-            continue
-        try:
-            if drop.gauge is not None:
-                seen.append(observe_push(drop, campaign))
-            elif drop.accelerometer is not None:
-                seen.append(observe_impact(drop))
-            else:
-                seen.append(observe_drop(drop, read_observed_track(drop)))
-        except MeasurementError as error:
-            failures.append((drop.name, error))
+    filmed = {drop.name: drop for drop in campaign.drops if drop.record.kind in ("track", "video")}
+    with open_executor(workers, None, len(filmed), compile_first=False) as (executor, _):
+        measured = {name: executor.submit(_observe_filmed, drop) for name, drop in filmed.items()}
+        for drop in campaign.drops:
+            try:
+                if drop.gauge is not None:
+                    seen.append(observe_push(drop, campaign))
+                elif drop.accelerometer is not None:
+                    seen.append(observe_impact(drop))
+                elif drop.name in measured:
+                    seen.append(measured[drop.name].result())
+            except MeasurementError as error:
+                failures.append((drop.name, error))
+            except BrokenExecutor as trouble:
+                raise explain_loss(executor, trouble, campaign.folder) or trouble from None
     if failures and not seen:
         raise failures[0][1]
     lines = [f"drop {name} left out: {error}" for name, error in failures]

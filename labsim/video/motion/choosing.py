@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from ...errors import MeasurementError
 from ...records import FloatArray
 from .outliers import OUTLIER, fit_without_outliers, follow_median, guess_spikes
 from .segments import HIGHEST_DEGREE, Ending, Motion
+from .variable_projection import fit_motion
 
 AFTER_END = 3  # frames used beyond the end of the deceleration
 LEAST_STRIDE = 4  # frames over which a speed is guessed
@@ -132,11 +132,14 @@ def choose_motion(
     for ending in endings if stops else ("open",):
         lead: Candidate | None = None
         for degree in range({"ease": 1, "open": 1}.get(ending, 0), HIGHEST_DEGREE + 1):
-            starts = _guess_starts(start, ending) if lead is None else [tuple(lead.motion.ends)]
+            if lead is None:
+                begin = _find_start(time[first], depth[first], error[first], degree, ending, start)
+            else:
+                begin = tuple(lead.motion.ends)
             here: Candidate | None = None
             # a poor model leaves out frames that a better one explains: begin again from the first guess too
             begins = [first] if lead is None or np.array_equal(lead.used, first) else [lead.used, first]
-            for begin, used in product(starts, begins):
+            for used in begins:
                 fitted = fit_without_outliers(time, depth, error, degree, ending, begin, used)
                 if fitted is None or (stops and not _is_sound(fitted[0], time[fitted[1]])):
                     continue
@@ -163,6 +166,20 @@ def choose_motion(
         weights[kept] / weights[kept].sum(),
         stops,
     )
+
+
+def _find_start(
+    time: FloatArray,
+    depth: FloatArray,
+    error: FloatArray,
+    degree: int,
+    ending: Ending,
+    start: tuple[float, float],
+) -> tuple[float, ...]:
+    """Of several first guesses, the ends that explain the frames best."""
+    fits = [fit_motion(time, depth, error, degree, ending, each) for each in _guess_starts(start, ending)]
+    found = [fit for fit in fits if fit is not None]
+    return tuple(min(found, key=lambda fit: fit.chi_square).ends) if found else start
 
 
 def _guess_starts(start: tuple[float, float], ending: Ending) -> list[tuple[float, ...]]:
