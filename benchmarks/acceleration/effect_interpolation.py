@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.acceleration.effect_roughness import CAMPAIGN, SPEEDS, lay_out
 from labsim.campaign import read_campaign
 from labsim.effects import list_effects
-from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.curves import extract_speeds, interpolate_speed
 from labsim.inference.emulation.grid import FELT_CELLS, FELT_STEPS, smooth_weights
 from labsim.inference.emulation.nodes import amplitude_nodes
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
@@ -36,12 +36,12 @@ SHARES = (0.1, 0.35, 0.6, 0.85)
 def run(asked: tuple[str, float, float]) -> np.ndarray:
     """Encoded speeds with (effect or nothing, amplitude, speed)."""
     name, amplitude, speed = asked
-    return encode_speeds(simulate(lay_out(FELT_CELLS, name, amplitude, speed)))
+    return extract_speeds(simulate(lay_out(FELT_CELLS, name, amplitude, speed)))
 
 
-def find_force(code: np.ndarray, stop: float) -> np.ndarray:
+def find_force(features: np.ndarray, stop: float) -> np.ndarray:
     ends = np.linspace(0.0, COMPARED * stop, BINS)
-    force = -np.diff(decode_speed(code, ends)) / np.diff(ends)
+    force = -np.diff(interpolate_speed(features, ends)) / np.diff(ends)
     time = np.linspace(-1.0, 1.0, force.size)
     return np.polynomial.legendre.legval(time, np.polynomial.legendre.legfit(time, force, 3))
 

@@ -25,7 +25,7 @@ from benchmarks.acceleration.error import bin_force
 from benchmarks.lagrangian_mesh import mesh
 from labsim.campaign import read_campaign
 from labsim.effects import list_effects, list_places
-from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.curves import extract_speeds, interpolate_speed
 from labsim.inference.emulation.grid import FELT_SPACINGS
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
@@ -67,8 +67,8 @@ def run(asked: tuple[bool, float, str, float]) -> np.ndarray:
     own, cells, name, speed = asked
     if own:
         setting = lay_out(cells, name, EFFECTS[name][0] if name else 0.0, speed)
-        code = encode_speeds(simulate(setting))
-        force = bin_force(lambda t: decode_speed(code, t), math.exp(code[1]))
+        features = extract_speeds(simulate(setting))
+        force = bin_force(lambda t: interpolate_speed(features, t), math.exp(features[1]))
     else:
         dust = mesh.Dust(p_m=P_M, **(EFFECTS[name][1] if name else {}))
         found = mesh.run_drop(dust, RADIUS, speed, mesh.Numerics(cells=cells), mass=MASS)

@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.acceleration.error import bin_force
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import prepare
-from labsim.inference.emulation.curves import decode_speed
+from labsim.inference.emulation.curves import interpolate_speed
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.observations import RunFeatures
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
@@ -59,22 +59,22 @@ def simulate_at(
     )
     return {
         key: np.array(
-            [features[key[1]].encode(run) for run in runs[k * len(SPACINGS) : (k + 1) * len(SPACINGS)]]
+            [features[key[1]].extract(run) for run in runs[k * len(SPACINGS) : (k + 1) * len(SPACINGS)]]
         )
         for k, key in enumerate(keys)
     }
 
 
-def find_force(code: np.ndarray, stop: float) -> np.ndarray:
-    return bin_force(lambda time: decode_speed(code, time), stop)[: round(COMPARED * BINS)]
+def find_force(run: np.ndarray, stop: float) -> np.ndarray:
+    return bin_force(lambda time: interpolate_speed(run, time), stop)[: round(COMPARED * BINS)]
 
 
-def compare(code: np.ndarray, others: np.ndarray) -> list[float]:
+def compare(run: np.ndarray, others: np.ndarray) -> list[float]:
     """Off in depth, stopping time and force from the mean of others (k, m), %."""
     mean = others.mean(axis=0)
     forces = np.array([find_force(each, np.exp(mean[1])) for each in others])
-    off = find_force(code, np.exp(mean[1])) - forces.mean(axis=0)
-    return [*(100.0 * (code - mean)[:2]), 100.0 * float(np.sqrt(np.mean(off**2)) / forces.mean(axis=0).max())]
+    off = find_force(run, np.exp(mean[1])) - forces.mean(axis=0)
+    return [*(100.0 * (run - mean)[:2]), 100.0 * float(np.sqrt(np.mean(off**2)) / forces.mean(axis=0).max())]
 
 
 def main() -> None:
@@ -96,7 +96,7 @@ def main() -> None:
         fit_hypothesis(problem, tuple(amplitudes), (np.log(P_M), amplitudes), around=True, iterations=0)
     there = simulate_at(problem, features, speeds)
     between = {
-        (cause, drop): tables[drop].code(np.log(P_M), np.log(speeds[drop]), CAUSES[cause])
+        (cause, drop): tables[drop].features(np.log(P_M), np.log(speeds[drop]), CAUSES[cause])
         for cause, drop in there
     }
 

@@ -1,4 +1,4 @@
-"""How far the solver's deceleration is known: fourteen drops beside a Lagrangian mesh, and what the code of a run keeps of it.
+"""How far the solver's deceleration is known: fourteen drops beside a Lagrangian mesh, and what the features of a run keep of it.
 
     python -m benchmarks.acceleration.error
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.lagrangian_mesh import mesh
 from benchmarks.lagrangian_mesh.make_campaigns import SERIES
-from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.curves import extract_speeds, interpolate_speed
 from labsim.inference.emulation.grid import FELT_CELLS, FELT_SPACINGS
 from labsim.inference.observations.observe_acceleration import BINS, COMPARED
 from labsim.records import Material, Projectile
@@ -41,15 +41,15 @@ def bin_force(speed_at: Callable[[np.ndarray], np.ndarray], stop: float) -> np.n
     return -np.diff(speed_at(edges)) / np.diff(edges)
 
 
-def simulate_codes(radius: float, mass: float, speed: float, p_m: float) -> np.ndarray:
+def simulate_features(radius: float, mass: float, speed: float, p_m: float) -> np.ndarray:
     """What the likelihood compares, the mean over spacings."""
     setting = DropSetting(Projectile("hemisphere", radius, mass), speed, Material(p_m=p_m), after_stop=0.16)
     runs = [simulate(setting.replace(spacing=radius / FELT_CELLS * factor)) for factor in FELT_SPACINGS]
-    return np.asarray(np.mean([encode_speeds(run) for run in runs], axis=0))
+    return np.asarray(np.mean([extract_speeds(run) for run in runs], axis=0))
 
 
-def find_force(code: np.ndarray) -> np.ndarray:
-    return bin_force(lambda time: decode_speed(code, time), math.exp(code[1]))
+def find_force(features: np.ndarray) -> np.ndarray:
+    return bin_force(lambda time: interpolate_speed(features, time), math.exp(features[1]))
 
 
 def main() -> None:
@@ -77,8 +77,8 @@ def main() -> None:
             )
             plain = bin_force(lambda t, own=own: np.interp(t, own.time, own.velocity), own.stopping_time)
             keep(f"labsim, {cells} spacings", plain)
-            keep(f"its code, {cells} spacings", find_force(encode_speeds(own)))
-        keep("the mean of two codes", find_force(simulate_codes(radius, mass, speed, p_m)))
+            keep(f"its features, {cells} spacings", find_force(extract_speeds(own)))
+        keep("the mean of two codes", find_force(simulate_features(radius, mass, speed, p_m)))
     print("| beside the mesh of 16 cells | rms, % of the peak | of the mean over the drops | correlation after "
           + ", ".join(map(str, LAGS)) + " stretches |\n|---|---|---|---|")  # fmt: skip
     for name, each in rows.items():
@@ -100,9 +100,9 @@ def compare_by_depth() -> None:
     for p_m, speed in product(P_M, SPEEDS):
         run = mesh.run_drop(mesh.Dust(p_m=p_m), radius, speed, mesh.Numerics(cells=12.0), mass=mass)
         reference = bin_force(lambda t, run=run: np.interp(t, run.time, run.speed), run.stopping_time)
-        code = simulate_codes(radius, mass, speed, p_m)
-        depths.append(math.exp(code[0]) / radius)
-        off.append(100 * (find_force(code) - reference) / reference.max())
+        features = simulate_features(radius, mass, speed, p_m)
+        depths.append(math.exp(features[0]) / radius)
+        off.append(100 * (find_force(features) - reference) / reference.max())
     print(
         "\n| depth, tip radii | drops | rms, % of the peak | mean at tenths of the stop, % |\n|---|---|---|---|"
     )

@@ -1,6 +1,6 @@
 """Diagnose a folder of labelled campaigns and compare with what was hidden in them.
 
-    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--out TABLE.md] [--rows ROWS.jsonl] [--workers 2]
+    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--rows ROWS.jsonl] [--workers 2]
 
 FOLDER holds campaigns and ``truth.json`` (cause, p_m, note per campaign). Prints top-1, class, false alarms, wrong
 names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaign's folder only; truth is opened afterwards.
@@ -168,18 +168,16 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
     }
 
 
-def read_rows(path: Path | None) -> list[dict]:
-    """What was judged before."""
-    if path is None or not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+def read_rows(*paths: Path) -> list[dict]:
+    """All lines of all files."""
+    return [json.loads(line) for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def score(rows: list[dict], truth: dict) -> pd.DataFrame:
+def score(rows: list[dict]) -> pd.DataFrame:
     """Set the answers beside the truth."""
     table = []
     for row in rows:
-        known = truth[row["campaign"]]
+        known = row["truth"]
         cause = name_hypothesis(known["cause"].split(" + "))
         alike = {row["first"], *row["alike"]}  # the stated class
         probabilities = dict(row["ranked"])
@@ -223,7 +221,6 @@ def main() -> None:
     )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", default="")
-    parser.add_argument("--out", type=Path)
     parser.add_argument("--rows", type=Path)
     parser.add_argument("--workers", type=int, default=None)
     parser.add_argument("--store", type=Path, default=None)
@@ -236,7 +233,8 @@ def main() -> None:
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
     ).stdout.strip()
-    rows = read_rows(options.rows)
+    known = json.loads(truths.read_text())
+    rows = read_rows(options.rows) if options.rows and options.rows.exists() else []
     for name in sorted(only or names):
         if name in {row["campaign"] for row in rows}:
             continue
@@ -247,12 +245,13 @@ def main() -> None:
         rows.append(describe(name, found) | {"commit": commit, "date": str(date.today())})
         top = ", ".join(f"{h} {p:.3f}" for h, p in rows[-1]["ranked"][:3])
         print(f"{name}: {top}  ({time.perf_counter() - began:.0f} s)", flush=True)
-        rows[-1] |= compare_gain(found, json.loads(truths.read_text())[name])
+        rows[-1] |= compare_gain(found, known[name])
+        rows[-1]["truth"] = {key: value for key, value in known[name].items() if key != "drops"}
         if options.rows:
             with options.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(rows[-1]) + "\n")
     rows = [row for row in rows if row["campaign"] in (only or names)]
-    table = score(rows, json.loads(truths.read_text()))
+    table = score(rows)
     nulls, others = table[table.hidden == "none"], table[~table.hidden.isin(["none", "unknown"])]
     lines = [
         f"{date.today()}, commit {commit}: {len(table)} campaigns",
@@ -265,15 +264,8 @@ def main() -> None:
         f"{others.share.median():.2f} ({others.share.min():.2f} to {others.share.max():.2f}; {others.share.count()} with "
         "something to remove)",
     ]
-    text = "\n".join(lines)
     print(table.to_string(index=False))
-    print(text)
-    if options.out:
-        header = "| " + " | ".join(table.columns) + " |\n|" + "---|" * len(table.columns) + "\n"
-        body = "\n".join(
-            "| " + " | ".join(str(value) for value in row) + " |" for row in table.itertuples(index=False)
-        )
-        options.out.write_text(f"{text}\n\n{header}{body}\n")
+    print("\n".join(lines))
 
 
 if __name__ == "__main__":

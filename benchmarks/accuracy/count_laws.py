@@ -1,6 +1,6 @@
 """Set the laws that were learned of unlisted causes beside what was hidden.
 
-    python -m benchmarks.accuracy.count_laws ROWS.jsonl FOLDER/truth.json ...
+    python -m benchmarks.accuracy.count_laws ROWS.jsonl ...
 
 ROWS.jsonl is what ``benchmarks/accuracy/blind.py --rows`` writes. Prints a row a campaign and counts with their 90 % intervals.
 A place is right where it is that of the best formula; a form where it is among the first three formulas.
@@ -8,7 +8,6 @@ A place is right where it is that of the best formula; a form where it is among 
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from pathlib import Path
@@ -63,15 +62,12 @@ def describe(row: dict, law: HiddenLaw) -> dict:
 
 
 def main() -> None:
-    rows = read_rows(Path(sys.argv[1]))
-    truths = {
-        name: each for path in sys.argv[2:] for name, each in json.loads(Path(path).read_text()).items()
-    }
+    rows = read_rows(*map(Path, sys.argv[1:]))
     counts: dict[str, list[bool]] = {}
     print("| campaign | hidden | first, P | formulas | place | form | size | p_m, Pa (true) | share |")
     print("|---|---|---|---|---|---|---|---|---|")
     for row in rows:
-        truth = truths[row["campaign"]]
+        truth = row["truth"]
         law = find_law(truth)
         if law is None:
             counts.setdefault("a law preferred to a listed cause, or to none", []).append(bool(row["law"]))

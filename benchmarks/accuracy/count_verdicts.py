@@ -1,8 +1,8 @@
 """Count what verdicts on fresh campaigns are worth, with 90 % intervals.
 
-    python -m benchmarks.accuracy.count_verdicts TABLE.md ...
+    python -m benchmarks.accuracy.count_verdicts ROWS.jsonl ...
 
-TABLE.md is what ``benchmarks/accuracy/blind.py --out`` writes of campaigns of a plan that fresh.py drew.
+ROWS.jsonl is what ``benchmarks/accuracy/blind.py --rows`` writes of campaigns of a plan that fresh.py drew.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.accuracy.draw_accuracy import draw_reliability, find_interval, read_table
+from benchmarks.accuracy.blind import read_rows, score
+from benchmarks.accuracy.draw_accuracy import draw_reliability, find_interval
 
 STRONG = 8.0  # standard deviations, from which a listed cause should be found
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
@@ -27,11 +28,7 @@ def count(name: str, right: pd.Series) -> None:
 
 
 def main() -> None:
-    table = pd.concat([read_table(Path(path)) for path in sys.argv[1:]], ignore_index=True)
-    for column in ("exact", "class", "named", "wrong>0.5", "in 90 %"):
-        table[column] = table[column] == "True"
-    for column in ("scatter", "sigmas"):
-        table[column] = table[column].astype(float)
+    table = score(read_rows(*map(Path, sys.argv[1:])))
     null, unlisted = table.hidden == "none", table.hidden == "unknown"
     pair = table.hidden.str.contains(" + ", regex=False)
     listed = ~null & ~unlisted & ~pair

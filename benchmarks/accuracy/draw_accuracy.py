@@ -1,6 +1,6 @@
-"""Draw tables of ``blind.py``: which cause was named first for each that was hidden, how often a stated probability was right.
+"""Draw what ``blind.py`` found: which cause was named first for each that was hidden, how often a stated probability was right.
 
-    python -m benchmarks.accuracy.draw_accuracy DIR TABLE.md [TABLE.md ...]
+    python -m benchmarks.accuracy.draw_accuracy DIR ROWS.jsonl [ROWS.jsonl ...]
 
 Writes DIR/confusion.png and DIR/reliability.png and prints the expected calibration error: the mean distance between the
 probability of the cause that stands first and the share of such verdicts that are right, over bins of that probability, weighted
@@ -18,18 +18,12 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta
 
+from benchmarks.accuracy.blind import read_rows, score
+
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 BINS = np.array([0.0, 0.5, 0.7, 0.9, 1.0])
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """The table in a file of ``blind.py --out``."""
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("|")]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in [lines[0], *lines[2:]]]
-    table = pd.DataFrame(rows[1:], columns=rows[0])
-    return table.assign(P=table.P.astype(float), right=table.hidden == table["first"])
 
 
 def draw_confusion(table: pd.DataFrame) -> plt.Figure:
@@ -67,7 +61,7 @@ def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
         inside = table[(table.P > low) & (table.P <= high)]
         if inside.empty:
             continue
-        right, all_ = int(inside.right.sum()), len(inside)
+        right, all_ = int(inside.exact.sum()), len(inside)
         said, true = inside.P.mean(), right / all_
         ax.plot([said, said], find_interval(right, all_), color="tab:blue", lw=1.2)
         ax.plot(said, true, "o", color="tab:blue")
@@ -86,12 +80,12 @@ def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
 
 def main() -> None:
     folder, *paths = map(Path, sys.argv[1:])
-    table = pd.concat([read_table(path) for path in paths], ignore_index=True)
+    table = score(read_rows(*paths))
     draw_confusion(table).savefig(folder / "confusion.png", dpi=110)
     figure, error = draw_reliability(table)
     figure.savefig(folder / "reliability.png", dpi=110)
     print(
-        f"{len(table)} campaigns: first is right in {int(table.right.sum())}; expected calibration error {error:.3f}"
+        f"{len(table)} campaigns: first is right in {int(table.exact.sum())}; expected calibration error {error:.3f}"
     )
 
 

@@ -2,7 +2,7 @@
 
     python -m benchmarks.accuracy.fit_exponent benchmarks/accuracy/rows/*.jsonl
 
-A file has one line a campaign, as ``blind.py --rows`` writes them, with what was hidden under ``hidden``. Every campaign is
+A file has one line a campaign, as ``blind.py --rows`` writes them. Every campaign is
 judged again from its evidences with other T. Printed for each T: how often the first is what was hidden, how often a wrong
 cause has more than 0.5, and the mean of -ln of the probability of what was hidden: the lower the better. Campaigns that this
 was fitted on are no test of it.
@@ -10,7 +10,6 @@ was fitted on are no test of it.
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from pathlib import Path
@@ -18,16 +17,11 @@ from types import SimpleNamespace
 
 import pandas as pd
 
-from benchmarks.accuracy.blind import name_hypothesis
+from benchmarks.accuracy.blind import name_hypothesis, read_rows
 from labsim.diagnosis import judge
 
 EXPONENTS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
 NOT_CAUSES = ("none", "unknown")
-
-
-def read_rows(paths: list[Path]) -> list[dict]:
-    """All lines of all files."""
-    return [json.loads(line) for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def judge_again(row: dict, temperature: float) -> dict[str, float]:
@@ -50,13 +44,13 @@ def judge_again(row: dict, temperature: float) -> dict[str, float]:
 
 
 def main(paths: list[Path]) -> None:
-    rows = read_rows(paths)
+    rows = read_rows(*paths)
     table = []
     for temperature in EXPONENTS:
         right = wrong = 0
         surprise = 0.0
         for row in rows:
-            hidden = name_hypothesis(row["hidden"].split(" + "))
+            hidden = name_hypothesis(row["truth"]["cause"].split(" + "))
             found = judge_again(row, temperature)
             first, probability = next(iter(found.items()))
             right += first == hidden

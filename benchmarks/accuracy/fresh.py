@@ -2,8 +2,8 @@
 
     python -m benchmarks.accuracy.fresh --seed 20261127 > fresh.toml
     python -m benchmarks.lagrangian_mesh.film_campaigns FOLDER --plan fresh.toml
-    OMP_NUM_THREADS=1 python -m benchmarks.accuracy.blind FOLDER --out fresh.md
-    python -m benchmarks.accuracy.count_verdicts fresh.md
+    OMP_NUM_THREADS=1 python -m benchmarks.accuracy.blind FOLDER --rows fresh.jsonl
+    python -m benchmarks.accuracy.count_verdicts fresh.jsonl
 
 The seed is drawn after the code that is judged is frozen. p_m is even in its logarithm from 700 to 2500 Pa, the scatter of p_m
 between samples from 1 to 10 %; half of the campaigns have two scans. A listed cause is as large as its prior says, without the

@@ -27,7 +27,7 @@ from labsim.inference.emulation.grid import (
     speed_nodes,
 )
 from labsim.inference.measure import measure
-from labsim.inference.observations.compacted_zone import ObservedScan, encode_scan_run, observe_scan
+from labsim.inference.observations.compacted_zone import ObservedScan, extract_map, observe_scan
 
 P_M, FINE = 1000.0, 2 * SCAN_CELLS
 CHANGES = {"": 0.0, "shear_strength": -0.4, "tensile_strength": -0.6}  # amplitudes
@@ -61,7 +61,7 @@ def run_map(
         parameter = effect.amplitudes[0]
         values = {parameter.name: parameter.hold(amplitude)}
         setting = effect.apply(setting, values, list_places(campaign)[scan.name])
-    return encode_scan_run(labsim.simulate(setting), scan)[1:]
+    return extract_map(labsim.simulate(setting), scan)[1:]
 
 
 def main(folder: str) -> None:

@@ -22,8 +22,8 @@ import numpy as np
 from benchmarks.solver.cone_factor import START, push_cone
 from benchmarks.solver.flat_punch import RADIUS
 from labsim.inference.emulation.grid import hasten, set_push
-from labsim.inference.observations.push_model import encode_push
-from labsim.inference.observations.sleeve_friction import encode_sleeve
+from labsim.inference.observations.push_model import extract_push
+from labsim.inference.observations.sleeve_friction import extract_sleeve
 from labsim.records import Material, Projectile
 from labsim.sph import DropRun, DropSetting, simulate
 
@@ -66,9 +66,9 @@ def main() -> None:
             run = push_cone(cells, rigidity, given.speed, 0.0, given.width, end, friction, given.start)
         else:
             run = push_in_law(given.law, cells, friction)
-        ratio = float(encode_sleeve(run)[0])
+        ratio = float(extract_sleeve(run)[0])
         found.append(ratio / friction)
-        resistance = math.exp(float(encode_push(run, whole=False)[0]))
+        resistance = math.exp(float(extract_push(run, whole=False)[0]))
         print(
             f"{given.law}, R/dx {cells}, from {given.start:g} to {end:g} radii, rigidity {rigidity:g}, friction {friction:g}: "
             f"R_f {100 * ratio:.2f} %, over the friction {ratio / friction:.3f}, tip {resistance / 1e3:.3g} kPa; "

@@ -111,10 +111,10 @@ def _scan(
     instrument = truth.instrument(hidden, place)
     speed = scan.speed.value + laboratory.scan_speeds * scan.speed.sigma * rng.standard_normal()
     log_p_m = math.log(hidden.p_m) + laboratory.samples * rng.standard_normal()
-    code = truth.map_code(hidden, scan, log_p_m, math.log(speed))
-    tip = math.exp(code[0]) - laboratory.lift * rng.exponential()
+    features = truth.map_features(hidden, scan, log_p_m, math.log(speed))
+    tip = math.exp(features[0]) - laboratory.lift * rng.exponential()
     frame = replace(template.map, z=template.map.z - (tip - template.map.tip_depth), tip_depth=tip)
-    seen = code[1:].reshape(frame.filling_factor.shape) * instrument.ct_scale
+    seen = features[1:].reshape(frame.filling_factor.shape) * instrument.ct_scale
     noise = laboratory.maps * np.nan_to_num(frame.sigma) * rng.standard_normal(seen.shape)
     blur = math.hypot(template.point_spread, instrument.ct_blur)
     return replace(template, map=replace(frame, filling_factor=seen + noise), blur=blur)
@@ -134,15 +134,15 @@ def _film(
     true_height = height.value + laboratory.heights * height.sigma * rng.standard_normal()
     fall = math.sqrt(2 * STANDARD_GRAVITY * max(true_height, 0.4 * height.value))
     speed = fall * (1 + laboratory.guide * rng.standard_normal())
-    code = truth.code(hidden, drop.projectile, log_p_m, math.log(speed))
+    features = truth.features(hidden, drop.projectile, log_p_m, math.log(speed))
     contact = CONTACT + laboratory.contacts * rng.uniform(-0.5, 0.5)
-    end = (contact + AFTER_STOP * math.exp(code[1])) * instrument.rate_factor
+    end = (contact + AFTER_STOP * math.exp(features[1])) * instrument.rate_factor
     frames = np.arange(int(end * camera.frame_rate))
     time = frames / camera.frame_rate
     row_error = laboratory.surfaces * camera.surface_row_sigma * rng.standard_normal()
     instant = Instant(contact, math.log(speed), row_error * camera.pixel_size)
     offset = instrument.row_offset_px * camera.pixel_size
-    depth = predict_depth(code, time, instant, instrument, offset)
+    depth = predict_depth(features, time, instant, instrument, offset)
     sigma = drop.record.row_sigma or 0.08
     row = camera.surface_row + depth / camera.pixel_size
     row = row + laboratory.rows * sigma * rng.standard_normal(frames.size)

@@ -16,7 +16,7 @@ import numpy as np
 from labsim.ct.reduce import ReducedScan
 from labsim.effects import Effect, Instrument, Place, apply_effects, list_effects, list_places
 from labsim.errors import SimulationError
-from labsim.inference.emulation.curves import encode_run
+from labsim.inference.emulation.curves import extract_curve
 from labsim.inference.emulation.forward import ResponseTable
 from labsim.inference.emulation.grid import set_nominal_drop
 from labsim.inference.emulation.nodes import place_strength
@@ -55,8 +55,8 @@ class TruthTable:
     """Runs that truths are made of: nominal ones on all nodes, and those with what is hidden at strengths CHANGED.
 
     templates : reduced scans of the campaign whose frame, mask and errors the maps of truths take; none, no maps.
-    tables : codes of drops; maps : codes of a scan, (ln D, all cells of its frame), by its name and the blur (m) that an effect
-    adds. Amplitudes are an effect's parameter minus its null; effects together have one, of 1.
+    tables : features of drops; maps : features of a scan, (ln D, all cells of its frame), by its name and the blur (m) that an
+    effect adds. Amplitudes are an effect's parameter minus its null; effects together have one, of 1.
     """
 
     campaign: Campaign
@@ -113,29 +113,29 @@ class TruthTable:
         for (family, variant, k), found in sorted(
             zip(jobs, parts, strict=True), key=lambda job: job[0][1] != NOMINAL
         ):
-            for table, encode in family.tables if variant not in failed else ():
-                codes = np.array([encode(run) for run in found])
+            for table, extract in family.tables if variant not in failed else ():
+                features = np.array([extract(run) for run in found])
                 index = PLACES[k]
                 if variant == NOMINAL:
-                    table.base[index] = codes
+                    table.base[index] = features
                 else:
                     name, amplitude = variant
                     entry = table.changes.setdefault(name, {}).setdefault(index, {})
                     if len(alone := list(variants[variant])) == 1:
                         table.parameters[name] = self.effect(alone[0]).amplitudes[0]
-                    entry[amplitude] = codes - table.base[index]
+                    entry[amplitude] = features - table.base[index]
 
     def _list_families(self, blurs: Sequence[float]) -> list[Family]:
         """All that is simulated with one projectile, with the tables that it fills; those of scans for these blurs."""
         families = []
         for projectile, speeds in self._families().items():
             table = self.tables.setdefault(projectile, _table(speeds))
-            families.append(Family(projectile, speeds, False, [(table, encode_run)]))
+            families.append(Family(projectile, speeds, False, [(table, extract_curve)]))
         for projectile, speeds in self._scan_families().items():
             seen: list[tuple[ResponseTable, Encode]] = [
                 (
                     self.maps.setdefault((each.scan.name, blur), _table(speeds)),
-                    partial(_encode_map, each, blur),
+                    partial(_extract_map, each, blur),
                 )
                 for each in self.templates
                 if each.scan.projectile.simulated == projectile
@@ -144,11 +144,13 @@ class TruthTable:
             families.append(Family(projectile, speeds, True, seen))
         return families
 
-    def code(self, hidden: Hidden, projectile: Projectile, log_p_m: float, log_speed: float) -> FloatArray:
+    def features(
+        self, hidden: Hidden, projectile: Projectile, log_p_m: float, log_speed: float
+    ) -> FloatArray:
         """Code of one drop of a truth."""
         return self._interpolate(self.tables[projectile.simulated], hidden, log_p_m, log_speed)
 
-    def map_code(self, hidden: Hidden, scan: Scan, log_p_m: float, log_speed: float) -> FloatArray:
+    def map_features(self, hidden: Hidden, scan: Scan, log_p_m: float, log_speed: float) -> FloatArray:
         """(ln D, filling factor on all cells) of one scan of a truth, its dust in the frame of the template."""
         key = (scan.name, self._blur(hidden))
         if key not in self.maps:
@@ -176,7 +178,7 @@ class TruthTable:
             raise SimulationError(
                 "simulation", "truth", f"{hidden.cause} has no runs that far; prepare it, or they failed"
             )
-        return table.code(log_p_m, log_speed, {name: amplitude})
+        return table.features(log_p_m, log_speed, {name: amplitude})
 
     def _name(self, effects: Effects) -> Variant:
         """What is simulated together, and its amplitude."""
@@ -257,7 +259,7 @@ def _table(speeds: Sequence[float]) -> ResponseTable:
     return ResponseTable(np.log(speeds), tuple(range(len(speeds))))
 
 
-def _encode_map(template: ReducedScan, blur: float, run: DropRun) -> FloatArray:
+def _extract_map(template: ReducedScan, blur: float, run: DropRun) -> FloatArray:
     """(1 + cells,): ln D and the filling factor on the template's cells, the deepest tip where the template's bead ends."""
     seen = see_dust(run, template.map, math.hypot(template.point_spread, blur))
     return np.concatenate([[math.log(run.penetration_depth)], seen.ravel()])

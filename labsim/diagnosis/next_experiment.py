@@ -112,7 +112,7 @@ def _suggest_pushes(
                 if problem.rescales_p_m(name):
                     changed = problem.effects[name].apply(changed, problem.at(name, values[name]), place)
             shift = math.log(read_value(changed.material) / read_value(state.material))
-            ends.append(table.code(fits[0].log_p_m + shift, math.log(speed), values)[0])
+            ends.append(table.features(fits[0].log_p_m + shift, math.log(speed), values)[0])
         ratios.append(ends[1] - ends[0])
         names_of.append(hypothesis)
         weights.append(probability)
@@ -152,10 +152,12 @@ def _predict(problem: Problem, fit: Fit, number: int, speed: float, shift: float
 
     shift : of ln p_m from the fit's.
     """
-    code = problem.tracks.features[number].table.code(fit.log_p_m + shift, math.log(speed), fit.values)
+    features = problem.tracks.features[number].table.features(
+        fit.log_p_m + shift, math.log(speed), fit.values
+    )
     instrument = next(iter(problem.instruments(fit.values).values()))
-    depth, stop = math.exp(code[0]), math.exp(code[1])
-    shape = np.interp(POINTS, FRACTIONS, code[2:])
+    depth, stop = math.exp(features[0]), math.exp(features[1])
+    shape = np.interp(POINTS, FRACTIONS, features[2:])
     return np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
 
 

@@ -15,7 +15,7 @@ from ..errors import InferenceError
 from ..records import Campaign, Projectile
 from ..runs.store import Progress, RunStore
 from ..sph import DropSetting
-from .emulation.curves import encode_run, encode_speeds
+from .emulation.curves import extract_curve, extract_speeds
 from .emulation.forward import ResponseTable
 from .emulation.grid import (
     FELT_STEPS,
@@ -29,14 +29,14 @@ from .emulation.grid import (
 )
 from .observations import Observation, RunFeatures, observe_further
 from .observations.acceleration_model import make_acceleration_model
-from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, encode_scan_run
+from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, extract_map
 from .observations.drop_model import make_drop_model
 from .observations.linearised_drop import ErrorBudget, RecordModel
 from .observations.observe import Observed, observe_drops
 from .observations.observe_acceleration import ObservedImpact
 from .observations.observe_push import ObservedPush, measure_ground
-from .observations.push_model import PushModel, encode_push
-from .observations.sleeve_friction import SleeveFriction, TipSleeves, encode_sleeve, measure_spread
+from .observations.push_model import PushModel, extract_push
+from .observations.sleeve_friction import SleeveFriction, TipSleeves, extract_sleeve, measure_spread
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
 from .problem import Problem
@@ -99,20 +99,20 @@ def open_problem(
             ground = measure_ground(pushes)
             numbers = sorted({int(n) for push in pushes for n in push.windows})
             reference = numbers[len(numbers) // 2]
-            encode = partial(encode_push, whole=pushes[0].feels_shaft)
-            features.append(RunFeatures(len(groups), table, encode))
+            extract = partial(extract_push, whole=pushes[0].feels_shaft)
+            features.append(RunFeatures(len(groups), table, extract))
             groups.append(ProjectileGroup(projectile, nodes, False, sparse, pushed=True))
             models += [PushModel(push, table, ground, reference) for push in pushes]
             with_sleeve = [push for push in pushes if push.compares_sleeve]
             if with_sleeve:
-                ratios = RunFeatures(len(groups) - 1, ResponseTable(np.log(nodes), sparse), encode_sleeve)
+                ratios = RunFeatures(len(groups) - 1, ResponseTable(np.log(nodes), sparse), extract_sleeve)
                 sleeves.append(TipSleeves(tuple(with_sleeve), ratios, measure_spread(with_sleeve)))
             continue
-        features.append(RunFeatures(len(groups), table, encode_run))
+        features.append(RunFeatures(len(groups), table, extract_curve))
         groups.append(ProjectileGroup(projectile, nodes, False, sparse, felt=felt))
         speeds = ResponseTable(np.log(nodes), sparse)
         if felt:
-            of_speeds.append(RunFeatures(len(groups) - 1, speeds, encode_speeds))
+            of_speeds.append(RunFeatures(len(groups) - 1, speeds, extract_speeds))
         models += [
             make_acceleration_model(drop, speeds, errors)
             if isinstance(drop, ObservedImpact)
@@ -128,8 +128,8 @@ def open_problem(
         nodes = own_speeds([scan.scan.speed.value for scan in scanned])
         sparse = tuple(range(len(nodes)))
         for scan in scanned:
-            encode = partial(encode_scan_run, observed=scan)
-            own = RunFeatures(len(groups), ResponseTable(np.log(nodes), sparse), encode)
+            extract = partial(extract_map, observed=scan)
+            own = RunFeatures(len(groups), ResponseTable(np.log(nodes), sparse), extract)
             zones.append(CompactedZone(scan, own))
         groups.append(ProjectileGroup(projectile, nodes, True, sparse))
     if zones:

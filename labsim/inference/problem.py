@@ -44,7 +44,7 @@ class Problem:
     shape_evidence: dict[str, float] = field(default_factory=dict)
     renamed: dict[str, str] = field(default_factory=dict)  # effect -> the name its runs were asked for under
     model: Model | None = None  # what the nominal model is extended by
-    # what the tables hold already, and codes of the nominal model: encoding a run means seeing it through every scan
+    # what the tables hold already, and features of the nominal model: extracting them means seeing it through every scan
     _filled: set[RunKey] = field(default_factory=set, repr=False)
     _plain: dict[RunKey, list[tuple[ResponseTable, FloatArray | None]]] = field(
         default_factory=dict, repr=False
@@ -93,49 +93,49 @@ class Problem:
         """What all observations take of runs."""
         return [each for observation in self.observations for each in observation.features]
 
-    def _encode(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
-        """Codes of one group, (speeds, spacings, m), for each table that rests on them; None where a run failed."""
+    def _extract(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
+        """Features of one group, (speeds, spacings, m), for each table that rests on them; None where a run failed."""
         runs = self.grid.stopped_runs(request, number)
         alike = len(self.groups[number].spacings(request.sparse, 0, request.variant != ""))
 
-        def encode(each: RunFeatures) -> FloatArray | None:
+        def extract(each: RunFeatures) -> FloatArray | None:
             if runs is None:
                 return None
-            codes = np.array([each.encode(run) for run in runs])
-            return codes.reshape(-1, alike, codes.shape[1])
+            features = np.array([each.extract(run) for run in runs])
+            return features.reshape(-1, alike, features.shape[1])
 
-        return [(each.table, encode(each)) for each in self.features if each.group == number]
+        return [(each.table, extract(each)) for each in self.features if each.group == number]
 
-    def _encode_plain(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
-        """Codes of the nominal model, encoded once."""
+    def _extract_plain(self, number: int, request: Request) -> list[tuple[ResponseTable, FloatArray | None]]:
+        """Features of the nominal model, extracted once."""
         key = request.of(number)
         if key not in self._plain:
-            self._plain[key] = self._encode(number, request)
+            self._plain[key] = self._extract(number, request)
         return self._plain[key]
 
     def _fill_base(self, number: int, index: float) -> None:
-        for table, codes in self._encode_plain(number, Request("", None, index)):
-            if codes is not None:
-                table.base[index] = codes.mean(axis=1)
+        for table, features in self._extract_plain(number, Request("", None, index)):
+            if features is not None:
+                table.base[index] = features.mean(axis=1)
 
     def _fill_change(self, number: int, request: Request, name: str, amplitude: float) -> None:
         if request.of(number) in self._filled:
             return
         self._filled.add(request.of(number))
-        before, after = self._encode_plain(number, request.plain), self._encode(number, request)
+        before, after = self._extract_plain(number, request.plain), self._extract(number, request)
         spacings = self.groups[number].spacings  # a change is one from the run of the same spacing
-        for (table, codes), (_, codes_before) in zip(after, before, strict=True):
+        for (table, features), (_, features_before) in zip(after, before, strict=True):
             kept = table.fingerprints if request.sparse else table.changes
             entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
-            if codes is not None and codes_before is not None:
+            if features is not None and features_before is not None:
                 own = [
                     spacings(request.sparse, k, False).index(f)
-                    for k in range(len(codes))
+                    for k in range(len(features))
                     for f in spacings(request.sparse, k, True)
                 ]
-                alike = np.take_along_axis(codes_before, np.reshape(own, (len(codes), -1, 1)), axis=1)
-                entry[amplitude] = (codes - alike).mean(axis=1)
+                alike = np.take_along_axis(features_before, np.reshape(own, (len(features), -1, 1)), axis=1)
+                entry[amplitude] = (features - alike).mean(axis=1)
 
     def state(self, group: ProjectileGroup, name: str = "") -> DropSetting:
         """The nominal model of one group, or of one of its pushes at its own speed, in the middle of the range of p_m."""

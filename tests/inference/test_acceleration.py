@@ -20,7 +20,7 @@ from labsim.diagnosis.gain import predict_held_out
 from labsim.diagnosis.unlisted.unknown import fit_unknown, law_coordinates
 from labsim.effects import Instrument
 from labsim.inference.calibrate import calibrate, prepare
-from labsim.inference.emulation.curves import decode_speed, encode_speeds
+from labsim.inference.emulation.curves import extract_speeds, interpolate_speed
 from labsim.inference.fits import steps
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations.acceleration_model import AccelerationModel
@@ -170,9 +170,9 @@ def test_runs_between_nodes_give_no_blow_at_contact(tmp_path: Path) -> None:
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
     problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
     model = problem.tracks.models[0]
-    code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
-    off = np.concatenate([code[:2], 1.001 * code[2:]])
-    seen, beside = (model.predict(each, Instrument(), model.start) for each in (code, off))
+    features = model.table.features(fit_.log_p_m, model.start.log_speed, {})
+    off = np.concatenate([features[:2], 1.001 * features[2:]])
+    seen, beside = (model.predict(each, Instrument(), model.start) for each in (features, off))
     assert np.abs(beside - seen).max() < 1e-6 * seen.max()
 
 
@@ -182,8 +182,8 @@ def test_errors_of_a_record_do_not_pass_for_its_scale(tmp_path: Path) -> None:
     problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
     model = problem.tracks.models[0]
     assert isinstance(model, AccelerationModel)
-    code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
-    here = model.predict(code, Instrument(), model.start)
+    features = model.table.features(fit_.log_p_m, model.start.log_speed, {})
+    here = model.predict(features, Instrument(), model.start)
     rough = here + 0.1 * here.max() * np.random.default_rng(1).normal(size=here.size)
     for felt in (here, rough):
         known = replace(model, observed=replace(model.observed, felt=felt))
@@ -204,11 +204,13 @@ def test_what_a_setting_of_the_solver_changes_is_an_error_and_no_cause(tmp_path:
     for changes in model.table.fingerprints["artificial_viscosity"].values():  # what half of it would do
         changes[amplitude] = np.full_like(next(iter(changes.values())), 0.01)
     block = steps.solve_at(problem, steps.ParameterPoint(fit_.log_p_m, {}, fit_.nuisances)).blocks[0]
-    code = model.table.code(fit_.log_p_m, model.start.log_speed, {})
+    features = model.table.features(fit_.log_p_m, model.start.log_speed, {})
     instant = model.start._replace(
         **dict(zip(("contact_time", "log_speed"), fit_.nuisances[0][0], strict=False))
     )
-    moved = model.predict(code + 0.01, Instrument(), instant) - model.predict(code, Instrument(), instant)
+    moved = model.predict(features + 0.01, Instrument(), instant) - model.predict(
+        features, Instrument(), instant
+    )
     column = moved * sigma / amplitude
     added = block.covariance - fit_.blocks[0].covariance
     n = column.size
@@ -223,8 +225,8 @@ def test_a_law_without_a_name_is_a_share_of_what_is_expected_not_of_what_is_reco
     reached = law_coordinates(problem, fit_)["reached"]
     for model, instant in zip(problem.tracks.models, problem.tracks.instants(fit_.nuisances[0]), strict=True):
         assert isinstance(model, AccelerationModel)
-        code = model.table.code(fit_.log_p_m, instant.log_speed, {})
-        here = np.where(model.below, np.maximum(model.predict(code, Instrument(), instant), 0.0), 0.0)
+        features = model.table.features(fit_.log_p_m, instant.log_speed, {})
+        here = np.where(model.below, np.maximum(model.predict(features, Instrument(), instant), 0.0), 0.0)
         start = fit_.drops.sections[model.observed.name].start
         assert reached[start : start + here.size] == pytest.approx(here, abs=1e-6 * here.max())
     assert fit_unknown(problem, fit_).evidence < fit_.evidence
@@ -253,9 +255,9 @@ def test_a_blunt_tip_is_told_that_contact_is_late_by_the_stretch_before_it(tmp_p
     before = int(np.argmax(model.observed.end > model.observed.contact_time)) + 1
     width = float(np.median(model.observed.end - model.observed.begin))
     late = model.start._replace(contact_time=float(model.observed.end[before]) + 0.5 * width)
-    code = model.table.code(fit_.log_p_m, late.log_speed, {})
-    slope = model.by_contact(code, Instrument(), late)
-    assert model.predict(code, Instrument(), late)[before] == pytest.approx(0.0, abs=1e-3)
+    features = model.table.features(fit_.log_p_m, late.log_speed, {})
+    slope = model.by_contact(features, Instrument(), late)
+    assert model.predict(features, Instrument(), late)[before] == pytest.approx(0.0, abs=1e-3)
     assert slope[before] < -0.01 * abs(slope).max()
     assert slope[before - 2] == pytest.approx(0.0, abs=1e-6 * abs(slope).max())
 
@@ -264,9 +266,9 @@ def test_a_blunt_tip_is_told_that_contact_is_late_by_the_stretch_before_it(tmp_p
 def test_the_force_of_a_round_tip_begins_at_nought(tip: str, blunt: bool) -> None:
     """Simulated speeds, smoothed: at contact a round tip still falls freely, a face is met with a force."""
     run = simulate(DropSetting(Projectile(tip, 0.5e-3, 2e-6), 0.4, Material(p_m=1300.0), spacing=1.25e-4))
-    code = encode_speeds(run)
+    features = extract_speeds(run)
     step = 1e-3 * run.stopping_time
-    speed = decode_speed(code, np.array([0.0, step]))
+    speed = interpolate_speed(features, np.array([0.0, step]))
     felt = STANDARD_GRAVITY - (speed[1] - speed[0]) / step
     mean = 0.4 / run.stopping_time
     assert is_blunt(make_profile(run.setting.projectile)) is blunt
@@ -279,10 +281,10 @@ def test_a_shear_factor_is_felt_as_its_square_of_tension() -> None:
     drop = DropSetting(Projectile("hemisphere", 0.5e-3, 2e-6), 0.4, Material(p_m=1300.0), spacing=1.25e-4)
     weaker = drop.material.tensile_log10_a + 2.0 * math.log10(0.52)
     changes = ({}, {"shear_factor": 0.52}, {"tensile_log10_a": weaker})
-    codes = [
-        encode_speeds(simulate(drop.replace(material=drop.material.replace(**change)))) for change in changes
+    features = [
+        extract_speeds(simulate(drop.replace(material=drop.material.replace(**change)))) for change in changes
     ]
-    plain, shear, tension = codes
+    plain, shear, tension = features
     np.testing.assert_allclose(shear[:2], tension[:2], atol=5e-4)
     np.testing.assert_allclose(shear[2:], tension[2:], atol=5e-4)
     assert np.all(np.abs(shear[:2] - plain[:2]) > 0.05)

@@ -10,7 +10,7 @@ from scipy.stats import norm
 from benchmarks.truths.video import evaluate_motion
 from labsim.effects import Instrument, LogNormal, Parameter
 from labsim.errors import ExtrapolationError
-from labsim.inference.emulation.curves import FRACTIONS, decode_depth, decode_rate, encode_run
+from labsim.inference.emulation.curves import FRACTIONS, extract_curve, interpolate_depth, interpolate_rate
 from labsim.inference.emulation.forward import Instant, ResponseTable, predict_depth, predict_speed
 from labsim.inference.emulation.grid import interpolation_weights, speed_nodes, strength_node
 from labsim.inference.emulation.nodes import enclosing_nodes, nearest_nodes
@@ -23,7 +23,7 @@ from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, P
 from labsim.sph import DropSetting, simulate
 
 
-def sine_code(depth=1e-3, stop=2e-3):
+def sine_features(depth=1e-3, stop=2e-3):
     shape = np.sin(0.5 * math.pi * np.minimum(FRACTIONS, 1.0))
     return np.concatenate([[math.log(depth), math.log(stop)], shape])
 
@@ -63,64 +63,68 @@ def test_speed_nodes_enclose_and_are_shared():
     assert strength_node(1) == 2000.0
 
 
-def test_a_run_comes_back_from_its_code():
+def test_a_run_comes_back_from_its_features():
     setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.3, Material(), spacing=5e-4 / 4)
     run = simulate(setting)
-    code = encode_run(run)
+    features = extract_curve(run)
     time = np.linspace(0, run.stopping_time, 60)
-    assert decode_depth(code, time) == pytest.approx(run.depth_at(time), abs=2e-3 * run.penetration_depth)
-    speed = decode_rate(code, time[5:-5])
+    assert interpolate_depth(features, time) == pytest.approx(
+        run.depth_at(time), abs=2e-3 * run.penetration_depth
+    )
+    speed = interpolate_rate(features, time[5:-5])
     assert speed == pytest.approx(
         np.interp(time[5:-5], run.time, run.velocity), abs=0.02 * setting.impact_speed
     )
 
 
 def test_prediction_is_continuous_at_contact_and_scales_with_the_instrument():
-    code, instant = sine_code(), Instant(5e-3, math.log(0.785), 0.0)
+    features, instant = sine_features(), Instant(5e-3, math.log(0.785), 0.0)
     time = np.array([5e-3 - 1e-9, 5e-3 + 1e-9])
     assert (
-        abs(np.diff(predict_depth(code, time, instant, Instrument(), 0.0))[0]) < 2.1e-9 * 0.785
+        abs(np.diff(predict_depth(features, time, instant, Instrument(), 0.0))[0]) < 2.1e-9 * 0.785
     )  # 2 ns of motion
     grid = np.linspace(0, 7e-3, 50)
-    plain = predict_depth(code, grid, instant, Instrument(), 0.0)
-    assert predict_depth(code, grid, instant, Instrument(pixel_factor=1.25), 0.0) == pytest.approx(
+    plain = predict_depth(features, grid, instant, Instrument(), 0.0)
+    assert predict_depth(features, grid, instant, Instrument(pixel_factor=1.25), 0.0) == pytest.approx(
         plain / 1.25, rel=1e-12
     )
-    assert predict_depth(code, grid * 0.8, instant, Instrument(rate_factor=0.8), 0.0) == pytest.approx(
+    assert predict_depth(features, grid * 0.8, instant, Instrument(rate_factor=0.8), 0.0) == pytest.approx(
         plain, rel=1e-9, abs=1e-12
     )
     step = 1e-7
-    later = predict_depth(code, grid, instant._replace(contact_time=5e-3 + step), Instrument(), 0.0)
-    speed = predict_speed(code, grid, instant, Instrument())
+    later = predict_depth(features, grid, instant._replace(contact_time=5e-3 + step), Instrument(), 0.0)
+    speed = predict_speed(features, grid, instant, Instrument())
     inside = np.abs(grid - 5e-3) > 1e-5
     assert ((plain - later) / step)[inside] == pytest.approx(speed[inside], rel=1e-3, abs=1e-4)
 
 
 def test_rows_that_are_read_one_after_another_show_a_later_tip():
     """Where it was when its row was read; and frames that come ever later show it ever further on its way."""
-    code, instant = sine_code(), Instant(5e-3, math.log(0.785), 0.0)
+    features, instant = sine_features(), Instant(5e-3, math.log(0.785), 0.0)
     grid = np.linspace(0, 7e-3, 50)
-    seen = predict_depth(code, grid, instant, Instrument(row_delay=0.3), 0.0)
-    assert seen == pytest.approx(predict_depth(code, grid + 0.3 * seen, instant, Instrument(), 0.0), abs=2e-7)
-    later = predict_depth(code, grid, instant, Instrument(clock_drift=20.0), 0.0)
+    seen = predict_depth(features, grid, instant, Instrument(row_delay=0.3), 0.0)
+    assert seen == pytest.approx(
+        predict_depth(features, grid + 0.3 * seen, instant, Instrument(), 0.0), abs=2e-7
+    )
+    later = predict_depth(features, grid, instant, Instrument(clock_drift=20.0), 0.0)
     clock = grid - 5e-3
     assert later == pytest.approx(
-        predict_depth(code, grid + 10.0 * clock**2, instant, Instrument(), 0.0), abs=1e-12
+        predict_depth(features, grid + 10.0 * clock**2, instant, Instrument(), 0.0), abs=1e-12
     )
 
 
 def test_effects_add_a_polynomial_that_vanishes_at_null():
     speeds = np.log([0.2, 0.3, 0.4])
-    base = np.stack([sine_code(stop=2e-3 + k * 1e-4) for k in range(3)])
+    base = np.stack([sine_features(stop=2e-3 + k * 1e-4) for k in range(3)])
     table = ResponseTable(speeds, (0, 1, 2), {0: base, 1: base - 0.2})
     table.changes["e"] = {0: {1.0: 0.1 * np.ones_like(base), 2.0: 0.4 * np.ones_like(base)}}
-    plain = table.code(math.log(1200.0), speeds[1], {})
-    assert table.code(math.log(1200.0), speeds[1], {"e": 0.0}) == pytest.approx(plain, abs=0)
+    plain = table.features(math.log(1200.0), speeds[1], {})
+    assert table.features(math.log(1200.0), speeds[1], {"e": 0.0}) == pytest.approx(plain, abs=0)
     # 0.1 a² goes through (0, 0), (1, 0.1), (2, 0.4)
-    assert table.code(math.log(1200.0), speeds[1], {"e": 1.5}) - plain == pytest.approx(0.225, rel=1e-12)
+    assert table.features(math.log(1200.0), speeds[1], {"e": 1.5}) - plain == pytest.approx(0.225, rel=1e-12)
     # runs that are added later, and those of another effect that takes the name, count at once
     table.base[2] = base - 0.5
-    later = table.code(math.log(4000.0), speeds[1], {})
+    later = table.features(math.log(4000.0), speeds[1], {})
     assert later == pytest.approx(base[1] - 0.5, rel=1e-12)
     table.changes["f"] = {0: {1.0: 0.3 * np.ones_like(base), 2.0: 1.2 * np.ones_like(base)}}
     table.changes["e"] = table.changes.pop("f")
@@ -130,7 +134,7 @@ def test_effects_add_a_polynomial_that_vanishes_at_null():
 def test_a_power_of_a_factor_is_met_from_its_null_to_its_limit():
     """ln D of dust weakened by a factor falls with ln of the factor: exact on that scale, far off on the factor's own."""
     speeds = np.log([0.2, 0.3, 0.4])
-    base = np.stack([sine_code() for _ in speeds])
+    base = np.stack([sine_features() for _ in speeds])
     table = ResponseTable(speeds, (0, 2), {0: base})
     table.changes["e"] = {
         0: {value - 1.0: np.full_like(base, -0.3 * math.log(value)) for value in (0.5, 0.05)}
@@ -148,15 +152,15 @@ def test_a_power_of_a_factor_is_met_from_its_null_to_its_limit():
 def test_an_effect_whose_runs_all_failed_is_said_so():
     """A diagnosis that learned a formula whose runs failed ended in a traceback."""
     speeds = np.log([0.2, 0.3, 0.4])
-    base = np.stack([sine_code() for _ in speeds])
+    base = np.stack([sine_features() for _ in speeds])
     table = ResponseTable(speeds, (0, 2), {0: base}, {"e": {0: {}}})
     with pytest.raises(ExtrapolationError, match="every run with it failed"):
-        table.code(math.log(1000.0), speeds[1], {"e": 1.0})
+        table.features(math.log(1000.0), speeds[1], {"e": 1.0})
 
 
 def test_what_an_effect_changes_bends_with_strength_through_three_nodes():
     speeds = np.log([0.2, 0.3, 0.4])
-    base = np.stack([sine_code() for _ in speeds])
+    base = np.stack([sine_features() for _ in speeds])
     table = ResponseTable(speeds, (0, 2), {k: base for k in (-1, 0, 1)})
 
     def bend(lp):
@@ -178,9 +182,9 @@ def make_drop(height=20e-3):
 
 def synthetic_track(drop, rng, outliers=()):
     camera = drop.camera
-    code, contact, speed = sine_code(), 0.0081, 0.785
+    features, contact, speed = sine_features(), 0.0081, 0.785
     time = np.arange(110) / camera.frame_rate
-    depth = predict_depth(code, time, Instant(contact, math.log(speed), 0.0), Instrument(), 0.0)
+    depth = predict_depth(features, time, Instant(contact, math.log(speed), 0.0), Instrument(), 0.0)
     row = camera.surface_row + depth / camera.pixel_size + 0.08 * rng.standard_normal(time.size)
     for k in outliers:
         row[k] += 4.0
@@ -267,7 +271,7 @@ def test_sampler_recovers_a_known_gaussian_and_goes_on_after_a_stop(tmp_path):
 
 def test_free_fall_has_its_own_gravity():
     instant = Instant(0.0, math.log(0.5), 0.0)
-    early = predict_depth(sine_code(), np.array([-1e-3]), instant, Instrument(), 0.0)[0]
+    early = predict_depth(sine_features(), np.array([-1e-3]), instant, Instrument(), 0.0)[0]
     assert early == pytest.approx(-0.5e-3 + 0.5 * STANDARD_GRAVITY * 1e-6, rel=1e-9)
 
 

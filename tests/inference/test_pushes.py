@@ -19,7 +19,7 @@ from labsim.inference.emulation.grid import INERTIA, hasten, set_nominal_drop, s
 from labsim.inference.fits.fitting import fit_hypothesis
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observations.observe_push import ObservedPush, measure_ground
-from labsim.inference.observations.push_model import encode_push
+from labsim.inference.observations.push_model import extract_push
 from labsim.runs.store import RunStore
 from labsim.sph import simulate
 from labsim.sph.materials import find_law
@@ -87,7 +87,7 @@ def test_inertia_does_not_matter_at_the_speed_of_a_run(monkeypatch: pytest.Monke
     found = []
     for inertia in (INERTIA, INERTIA / 4):
         monkeypatch.setattr(grid_module, "INERTIA", inertia)
-        found.append(encode_push(simulate(hasten(slow)), whole=False)[0])
+        found.append(extract_push(simulate(hasten(slow)), whole=False)[0])
     print(f"ln of the resistance {found[0]:.4f} and {found[1]:.4f}")
     assert found[0] == pytest.approx(found[1], abs=0.01)
 

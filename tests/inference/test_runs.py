@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from labsim.errors import InferenceError, SimulationError
-from labsim.inference.emulation.curves import encode_run
+from labsim.inference.emulation.curves import extract_curve
 from labsim.records import Material, Projectile
 from labsim.runs import run_file
 from labsim.runs.parts import Compaction, Motion
@@ -99,7 +99,7 @@ def test_parts_of_a_stored_run_are_those_of_the_whole(tmp_path: Path) -> None:
     motion, dust = store.get_parts(settings, [Motion, Compaction], workers=1)
     times = np.linspace(-1e-4, 1.2 * first.stopping_time, 50)
     assert isinstance(motion, Motion) and np.array_equal(motion.depth_at(times), first.depth_at(times))
-    assert np.array_equal(encode_run(motion), encode_run(first))
+    assert np.array_equal(extract_curve(motion), extract_curve(first))
     assert isinstance(dust, Compaction) and dust.penetration_depth == second.penetration_depth
     for name in ("r", "z", "volume", "filling_factor"):
         assert np.array_equal(getattr(dust.particles, name), getattr(second.particles, name))

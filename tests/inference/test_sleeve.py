@@ -17,11 +17,11 @@ from labsim.inference.emulation.grid import hasten, set_nominal_drop, set_push
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.measure import Measurements, measure
 from labsim.inference.observations.observe_push import ObservedPush
-from labsim.inference.observations.push_model import encode_push
+from labsim.inference.observations.push_model import extract_push
 from labsim.inference.observations.sleeve_friction import (
     USUAL,
     SleeveFriction,
-    encode_sleeve,
+    extract_sleeve,
     measure_spread,
 )
 from labsim.inference.supported import refuse_others
@@ -94,7 +94,7 @@ def test_the_ratio_of_a_run_is_that_of_an_even_sleeve() -> None:
         {"driver": math.pi * radius**2 * tip * way + shaft},
         True,
     )
-    assert encode_sleeve(run)[0] == pytest.approx(friction / tip)
+    assert extract_sleeve(run)[0] == pytest.approx(friction / tip)
 
 
 def test_ratios_of_real_soundings_scatter_from_record_to_record() -> None:
@@ -163,7 +163,7 @@ def test_a_hidden_contact_friction_is_found_with_a_sleeve_alone(tmp_path: Path, 
     push = set_push(set_nominal_drop(campaign, campaign.drops[0].projectile.simulated, 0.02, 8e4, 6), 0.02)
     rough = set_value(push.material, COHESION).replace(contact_friction=FRICTION)
     run = simulate(hasten(push.replace(material=rough)))
-    resistance, ratio = math.exp(encode_push(run, whole=False)[0]) / COHESION, float(encode_sleeve(run)[0])
+    resistance, ratio = math.exp(extract_push(run, whole=False)[0]) / COHESION, float(extract_sleeve(run)[0])
     found = {}
     for sleeve in (True, False):
         made = write_campaign(tmp_path / str(sleeve), sleeve, resistance, ratio)

@@ -12,7 +12,7 @@ from benchmarks.truths.table import Hidden, TruthTable
 from labsim.campaign import read_campaign, read_scan
 from labsim.ct.reduce import reduce_scan
 from labsim.errors import SimulationError
-from labsim.inference.emulation.curves import encode_run
+from labsim.inference.emulation.curves import extract_curve
 from labsim.inference.observations.compacted_zone import see_dust
 from labsim.sph import simulate
 
@@ -58,11 +58,11 @@ def test_a_pair_has_the_runs_of_the_one_that_costs_runs(truth):
     nodes = len(frictions) // 5  # three strengths without, two with it, once for pair and single
     assert frictions == 3 * nodes * [0.0] + 2 * nodes * [0.5]
     drop = truth.campaign.drops[0]
-    plain, rough = (encode_run(truth.store.runs[mu]) for mu in (0.0, 0.5))
+    plain, rough = (extract_curve(truth.store.runs[mu]) for mu in (0.0, 0.5))
     assert abs(rough[0] - plain[0]) > 0.02  # of ln depth: the friction is felt
     for effects, expected in (({**PIXELS, **FRICTION}, rough), (FRICTION, rough), (PIXELS, plain)):
-        code = truth.code(Hidden(effects), drop.projectile, np.log(1300.0), np.log(0.3))
-        assert code == pytest.approx(expected, abs=1e-9)
+        features = truth.features(Hidden(effects), drop.projectile, np.log(1300.0), np.log(0.3))
+        assert features == pytest.approx(expected, abs=1e-9)
 
 
 def test_both_of_a_pair_are_in_the_film(truth):
@@ -75,15 +75,16 @@ def test_both_of_a_pair_are_in_the_film(truth):
 def test_what_was_not_simulated_is_between_what_was(truth):
     projectile, place = truth.campaign.drops[0].projectile, (np.log(1300.0), np.log(0.3))
     plain, half, rough = (
-        truth.code(Hidden({"contact_friction": {"mu": mu}}), projectile, *place) for mu in (0.0, 0.25, 0.5)
+        truth.features(Hidden({"contact_friction": {"mu": mu}}), projectile, *place)
+        for mu in (0.0, 0.25, 0.5)
     )
     assert half == pytest.approx((plain + rough) / 2, abs=1e-9)
     with pytest.raises(SimulationError, match="has no runs that far"):
-        truth.code(Hidden({"contact_friction": {"mu": 0.6}}), projectile, *place)
+        truth.features(Hidden({"contact_friction": {"mu": 0.6}}), projectile, *place)
     kept = truth.holding(Hidden(FRICTION))
-    assert np.array_equal(kept.code(Hidden(FRICTION), projectile, *place), rough)
+    assert np.array_equal(kept.features(Hidden(FRICTION), projectile, *place), rough)
     with pytest.raises(SimulationError):
-        truth.holding(Hidden(PIXELS)).code(Hidden(FRICTION), projectile, *place)
+        truth.holding(Hidden(PIXELS)).features(Hidden(FRICTION), projectile, *place)
 
 
 def test_a_blurred_map_says_how_wide_its_point_spread_is():

@@ -1,6 +1,6 @@
 """From a handful of runs of one drop to its depth curve anywhere near them.
 
-A run is encoded as (ln D, ln T_s, s(τ)): depth over D at fixed fractions τ of the stopping time, to a little beyond the
+The features of a run are (ln D, ln T_s, s(τ)): depth over D at fixed fractions τ of the stopping time, to a little beyond the
 stop. These are smooth in every parameter even where the curve itself is not (its kink moves with the stop), so low
 polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.md gives the measured error.
 """
@@ -48,13 +48,13 @@ def _smooth_to_the_stop(blunt: bool) -> tuple[FloatArray, FloatArray]:
 SMOOTHED = {blunt: _smooth_to_the_stop(blunt) for blunt in (False, True)}
 
 
-def encode_run(run: DropRun | Motion) -> FloatArray:
+def extract_curve(run: DropRun | Motion) -> FloatArray:
     """(2 + len(FRACTIONS),): ln D, ln T_s and the normalised depths of one run."""
     shape = run.depth_at(FRACTIONS * run.stopping_time) / run.penetration_depth
     return np.concatenate([[np.log(run.penetration_depth), np.log(run.stopping_time)], shape])
 
 
-def encode_speeds(run: DropRun | Motion) -> FloatArray:
+def extract_speeds(run: DropRun | Motion) -> FloatArray:
     """(2 + len(FRACTIONS),): ln D, ln T_s and the speeds of one run in D/T_s, whose differences are accelerations: the second
     difference of stored depths would show the straight lines between them. Smooth up to the stop: SMOOTHED.
 
@@ -66,26 +66,26 @@ def encode_speeds(run: DropRun | Motion) -> FloatArray:
     return np.concatenate([[np.log(depth), np.log(stop)], shape])
 
 
-def decode_speed(code: FloatArray, time: FloatArray) -> FloatArray:
-    """Speed (m/s) at times (s, since contact, >= 0) of what ``encode_speeds`` made; held after the last fraction."""
-    depth, stop = np.exp(code[0]), np.exp(code[1])
-    return depth / stop * _draw_spline(code)(np.clip(time / stop, 0.0, FRACTIONS[-1]))
+def interpolate_speed(features: FloatArray, time: FloatArray) -> FloatArray:
+    """Speed (m/s) at times (s, since contact, >= 0) of what ``extract_speeds`` made; held after the last fraction."""
+    depth, stop = np.exp(features[0]), np.exp(features[1])
+    return depth / stop * _draw_spline(features)(np.clip(time / stop, 0.0, FRACTIONS[-1]))
 
 
-def decode_depth(code: FloatArray, time: FloatArray) -> FloatArray:
-    """Depth (m) at times (s, since contact, >= 0) of an encoded curve; held after the last fraction."""
-    depth, stop = np.exp(code[0]), np.exp(code[1])
-    return depth * _draw_spline(code)(np.clip(time / stop, 0.0, FRACTIONS[-1]))
+def interpolate_depth(features: FloatArray, time: FloatArray) -> FloatArray:
+    """Depth (m) at times (s, since contact, >= 0) from the features of a run; held after the last fraction."""
+    depth, stop = np.exp(features[0]), np.exp(features[1])
+    return depth * _draw_spline(features)(np.clip(time / stop, 0.0, FRACTIONS[-1]))
 
 
-def decode_rate(code: FloatArray, time: FloatArray) -> FloatArray:
-    """Speed (m/s) of an encoded curve at times (s) since contact."""
-    depth, stop = np.exp(code[0]), np.exp(code[1])
+def interpolate_rate(features: FloatArray, time: FloatArray) -> FloatArray:
+    """Speed (m/s) from the features of a run at times (s) since contact."""
+    depth, stop = np.exp(features[0]), np.exp(features[1])
     fraction = time / stop
-    rate = depth / stop * _draw_spline(code)(np.clip(fraction, 0.0, FRACTIONS[-1]), 1)
+    rate = depth / stop * _draw_spline(features)(np.clip(fraction, 0.0, FRACTIONS[-1]), 1)
     return np.where(fraction <= FRACTIONS[-1], rate, 0.0)
 
 
-def _draw_spline(code: FloatArray) -> PPoly:
-    """The cubic spline (not-a-knot) through the normalised depths of a code."""
-    return PPoly.construct_fast(UNIT_SPLINES @ code[2:], FRACTIONS)
+def _draw_spline(features: FloatArray) -> PPoly:
+    """The cubic spline (not-a-knot) through the normalised depths among the features of a run."""
+    return PPoly.construct_fast(UNIT_SPLINES @ features[2:], FRACTIONS)

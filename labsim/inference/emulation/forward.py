@@ -1,7 +1,7 @@
 """What the simulation says a drop's camera should have recorded, for any p_m, speed and amplitudes of effects near the runs.
 
-Codes of runs (curves.py) are interpolated in ln v over all speed nodes and in ln p_m over all strength nodes; an effect adds the
-difference its own runs made, a smooth curve in its amplitude that vanishes at null, and one through all its strength nodes.
+Features of runs (curves.py) are interpolated in ln v over all speed nodes and in ln p_m over all strength nodes; an effect adds
+the difference its own runs made, a smooth curve in its amplitude that vanishes at null, and one through all its strength nodes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from jaxtyping import Float
 from ...effects import Instrument, Parameter
 from ...errors import ExtrapolationError
 from ...records import STANDARD_GRAVITY, FloatArray
-from .curves import decode_depth, decode_rate
+from .curves import interpolate_depth, interpolate_rate
 from .grid import STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
 
 EXPOSED = 8  # times that an instant is put right by the tip's depth: each leaves speed times delay of the last change
@@ -27,7 +27,7 @@ Changes = dict[float, dict[float, FloatArray]]
 
 @dataclass
 class ResponseTable:
-    """Codes of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
+    """Features of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds.
     fingerprints : the same at the few speeds, taken where there are no changes. parameters : of effects whose amplitudes
     have a grade of their own."""
@@ -42,9 +42,9 @@ class ResponseTable:
         default_factory=dict, repr=False, compare=False
     )
 
-    def code(self, log_p_m: float, log_speed: float, amplitudes: Mapping[str, float]) -> FloatArray:
-        """Interpolated code (m,)."""
-        return self.at(log_p_m, log_speed).code(amplitudes)
+    def features(self, log_p_m: float, log_speed: float, amplitudes: Mapping[str, float]) -> FloatArray:
+        """Interpolated features (m,)."""
+        return self.at(log_p_m, log_speed).features(amplitudes)
 
     def at(self, log_p_m: float, log_speed: float) -> Response:
         """What the runs say at one strength and speed. Raises ExtrapolationError where no run says anything."""
@@ -62,22 +62,22 @@ class ResponseTable:
         return any((self.changes.get(name) or self.fingerprints.get(name, {})).values())
 
     def grade(self, name: str, amplitude: float) -> float:
-        """Where an amplitude of an effect lies on the scale on which codes are interpolated."""
+        """Where an amplitude of an effect lies on the scale on which features are interpolated."""
         return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude
 
-    def stack(self, codes: Mapping[float, FloatArray]) -> FloatArray:
-        """The codes of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""
+    def stack(self, features: Mapping[float, FloatArray]) -> FloatArray:
+        """The features of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""
         # ids of a table that came from another process mean nothing: the mapping itself is compared
-        known, stacked = self._stacks.get(id(codes), (None, None))
-        if stacked is None or known is not codes or len(stacked) != sum(map(len, codes.values())):
-            stacked = np.concatenate(list(codes.values()))
-            self._stacks[id(codes)] = codes, stacked
+        known, stacked = self._stacks.get(id(features), (None, None))
+        if stacked is None or known is not features or len(stacked) != sum(map(len, features.values())):
+            stacked = np.concatenate(list(features.values()))
+            self._stacks[id(features)] = features, stacked
         return stacked
 
 
 @dataclass(frozen=True)
 class Response:
-    """A table at one strength and speed. across : (speeds,) weights of its speeds; plain : (m,) code without any effect."""
+    """A table at one strength and speed. across : (speeds,) weights of its speeds; plain : (m,) features without any effect."""
 
     table: ResponseTable
     log_p_m: float
@@ -85,16 +85,16 @@ class Response:
     across: Float[np.ndarray, " speeds"]
     plain: Float[np.ndarray, " m"]
 
-    def code(self, amplitudes: Mapping[str, float]) -> FloatArray:
-        """The code (m,) with effects; that of ``plain`` itself where none of them has runs in the table."""
-        code = self.plain
+    def features(self, amplitudes: Mapping[str, float]) -> FloatArray:
+        """The features (m,) with effects; that of ``plain`` itself where none of them has runs in the table."""
+        features = self.plain
         for name, amplitude in amplitudes.items():
             if amplitude != 0.0 and (name in self.table.changes or name in self.table.fingerprints):
-                code = code + self.change(name, amplitude)
-        return code
+                features = features + self.change(name, amplitude)
+        return features
 
     def change(self, name: str, amplitude: float) -> FloatArray:
-        """What an effect adds to the code, (m,)."""
+        """What an effect adds to the features, (m,)."""
         if name in self.table.changes:
             runs, across = self.table.changes[name], self.across
         else:
@@ -128,32 +128,38 @@ class Instant(NamedTuple):
 
 
 def predict_depth(
-    code: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument, offset: float
+    features: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument, offset: float
 ) -> FloatArray:
     """Stated depth (m) at stated times (s). offset: row offset of the surface, m on the stated scale."""
-    depth = _fall(code, _read_clock(code, time, instant, instrument), instant)
+    depth = _fall(features, _read_clock(features, time, instant, instrument), instant)
     return depth / instrument.pixel_factor + offset + instant.surface
 
 
-def predict_speed(code: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument) -> FloatArray:
+def predict_speed(
+    features: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument
+) -> FloatArray:
     """Stated speed (m/s), derivative of predict_depth with respect to minus the contact time."""
-    clock = _read_clock(code, time, instant, instrument)
+    clock = _read_clock(features, time, instant, instrument)
     speed = math.exp(instant.log_speed)
-    rate = np.where(clock < 0.0, speed + STANDARD_GRAVITY * clock, decode_rate(code, np.maximum(clock, 0.0)))
+    rate = np.where(
+        clock < 0.0, speed + STANDARD_GRAVITY * clock, interpolate_rate(features, np.maximum(clock, 0.0))
+    )
     return rate / instrument.pixel_factor
 
 
-def _read_clock(code: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument) -> FloatArray:
+def _read_clock(
+    features: FloatArray, time: FloatArray, instant: Instant, instrument: Instrument
+) -> FloatArray:
     """True times from contact (s) at which the tip was seen where frames of these stated times (s) show it."""
     clock = instrument.true_time(time) - instant.contact_time
     clock = clock * (1.0 + 0.5 * instrument.clock_drift * clock)
     exposed = clock
     for _ in range(EXPOSED if instrument.row_delay else 0):  # where it is says when its row is read
-        exposed = clock + instrument.row_delay * _fall(code, exposed, instant)
+        exposed = clock + instrument.row_delay * _fall(features, exposed, instant)
     return exposed
 
 
-def _fall(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
+def _fall(features: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
     """True depth (m) at true times from contact (s)."""
     fall = clock * (math.exp(instant.log_speed) + 0.5 * STANDARD_GRAVITY * clock)
-    return np.where(clock < 0.0, fall, decode_depth(code, np.maximum(clock, 0.0)))
+    return np.where(clock < 0.0, fall, interpolate_depth(features, np.maximum(clock, 0.0)))

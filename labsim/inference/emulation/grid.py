@@ -1,6 +1,6 @@
 """Runs on a fixed grid of impact speeds and p_m, shared by every campaign with the same projectiles and dust.
 
-Drops differ in speed by a continuum, runs need not: codes of runs (curves.py) are smooth in ln v and ln p_m, so the nodes
+Drops differ in speed by a continuum, runs need not: features of runs (curves.py) are smooth in ln v and ln p_m, so the nodes
 are fixed numbers (SPEED_RATIO, STRENGTH_RATIO apart) and a second campaign with the same projectiles finds them stored.
 """
 

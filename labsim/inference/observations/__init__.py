@@ -32,12 +32,12 @@ from .linearised_drop import ErrorBudget, Perturbation
 
 @dataclass(frozen=True)
 class RunFeatures:
-    """Runs of one group, (number ``group``), as an observation takes them. encode : the part of a run that it reads -> (m,)
-    features, smooth in ln speed and ln p_m; table : what keeps and interpolates them."""
+    """Runs of one group, (number ``group``), as an observation takes them. extract : run -> the (m,) features
+    that the observation reads, smooth in ln speed and ln p_m; table : what keeps and interpolates them."""
 
     group: int
     table: ResponseTable
-    encode: Callable[[Any], FloatArray]
+    extract: Callable[[Any], FloatArray]
 
 
 @runtime_checkable

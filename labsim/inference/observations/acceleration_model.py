@@ -22,7 +22,7 @@ from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph.profile import is_blunt
 from ...sph.tips import make_profile
-from ..emulation.curves import decode_speed
+from ..emulation.curves import interpolate_speed
 from ..emulation.forward import Instant, ResponseTable
 from .observe_acceleration import BINS, ObservedImpact
 
@@ -109,19 +109,21 @@ class AccelerationModel:
         apart = np.tril(end[:, None] - middle[None, :])
         return np.asarray(-apart * width[None, :] * self.below[None, :])
 
-    def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
-        """Mean specific force (m/s²) over each stretch, (n,), of an encoded curve."""
+    def predict(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+        """Mean specific force (m/s²) over each stretch, (n,), from the features of a run."""
         begin, end = self.observed.begin, self.observed.end
-        before, after = (_find_speed(code, t - instant.contact_time, instant) for t in (begin, end))
+        before, after = (_find_speed(features, t - instant.contact_time, instant) for t in (begin, end))
         return STANDARD_GRAVITY - (after - before) / (end - begin)
 
-    def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+    def by_contact(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Derivative of ``predict`` by the contact time, m/s³. A blunt tip's force begins with a jump inside a stretch: a slope
         taken there alone would point a contact that is late away from the data, and is taken over a stretch to either side."""
         step = self._stretch if self.blunt else SHORT * self._stretch
         late = instant._replace(contact_time=instant.contact_time + step)
         early = instant._replace(contact_time=instant.contact_time - step)
-        return (self.predict(code, instrument, late) - self.predict(code, instrument, early)) / (2 * step)
+        return (self.predict(features, instrument, late) - self.predict(features, instrument, early)) / (
+            2 * step
+        )
 
     @property
     def surface_sigma(self) -> float:
@@ -156,10 +158,10 @@ class AccelerationModel:
         return np.clip(0.5 + clock / (self.observed.end - self.observed.begin), 0.0, 1.0)
 
     def slope(
-        self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
+        self, features: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
     ) -> FloatArray:
         """What the solver may be off by a share of from shallow to deep drops, m/s²: one too deep takes as much too long."""
-        longer = code.copy()
+        longer = features.copy()
         longer[:2] += 1e-3
         return (self.predict(longer, instrument, instant) - here) / 1e-3
 
@@ -202,11 +204,11 @@ class AccelerationModel:
         )
 
 
-def _find_speed(code: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
+def _find_speed(features: FloatArray, clock: FloatArray, instant: Instant) -> FloatArray:
     """m/s, free fall before contact. In the dust the run's speed over its first: between nodes that is not quite the impact's,
     and a jump of a thousandth within one stretch is a blow."""
     impact = math.exp(instant.log_speed)
-    inside = decode_speed(code, np.append(np.maximum(clock, 0.0), 0.0))
+    inside = interpolate_speed(features, np.append(np.maximum(clock, 0.0), 0.0))
     return np.where(clock < 0.0, impact + STANDARD_GRAVITY * clock, impact * (inside[:-1] / inside[-1]))
 
 

@@ -1,10 +1,11 @@
 """The compacted zones of CT maps in the likelihood: simulated dust seen through each scan, in the frame of the tip.
 
-Codes of scan runs are (ln D, filling factor on the scan's cells), the simulated dust moved so that its deepest tip lies where the
-scan's bead ends: the zone under the tip changes slowly with speed and p_m, the depth that it lies at does not. The bead rebounds
-by some tens of micrometres after the dust has stopped moving, so both are compared up to a LIFT. Each scan has noise of its own,
-correlated between neighbouring cells as measured in undisturbed dust, its speed and its sample's strength. The solver errs alike
-in drops that are alike, so its errors are common to scans as they are to drops, and the grey level is the scanner's.
+Features of scan runs are (ln D, filling factor on the scan's cells), the simulated dust moved so that its deepest tip lies
+where the scan's bead ends: the zone under the tip changes slowly with speed and p_m, the depth that it lies at does not. The
+bead rebounds by some tens of micrometres after the dust has stopped moving, so both are compared up to a LIFT. Each scan has
+noise of its own, correlated between neighbouring cells as measured in undisturbed dust, its speed and its sample's strength.
+The solver errs alike in drops that are alike, so its errors are common to scans as they are to drops, and the grey level is the
+scanner's.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ def see_dust(
     )
 
 
-def encode_scan_run(run: DropRun | Compaction, observed: ObservedScan) -> FloatArray:
+def extract_map(run: DropRun | Compaction, observed: ObservedScan) -> FloatArray:
     """(1 + n,): ln D and the filling factor on the compared cells, through the point spread that the scan itself shows."""
     reduced = observed.reduced
     seen = see_dust(run, reduced.map, reduced.point_spread, masked=~observed.cells)
@@ -188,16 +189,16 @@ class CompactedZone:
         amplitudes, instrument = nominal.amplitudes, nominal.instruments[observed.name]
         response = self.table.at(log_p_m, log_speed)
 
-        def see(code: FloatArray, inst: Instrument) -> FloatArray:
-            return np.concatenate([code[1:] * inst.ct_scale, [math.exp(code[0])]])
+        def see(features: FloatArray, inst: Instrument) -> FloatArray:
+            return np.concatenate([features[1:] * inst.ct_scale, [math.exp(features[0])]])
 
         def predict(lp: float, ls: float) -> FloatArray:
-            return see(self.table.code(lp, ls, amplitudes), instrument)
+            return see(self.table.features(lp, ls, amplitudes), instrument)
 
-        here = see(response.code(amplitudes), instrument)
+        here = see(response.features(amplitudes), instrument)
         changed = np.zeros(here.size - 1)  # of the compaction, not of the dust that it began with
         if amplitudes:
-            plain = see(response.code({}), instrument)[:-1] - observed.undisturbed
+            plain = see(response.features({}), instrument)[:-1] - observed.undisturbed
             changed = here[:-1] - observed.beside - plain
         data = np.concatenate([observed.filling_factor, [found.tip_depth]])
         n = data.size - 1
@@ -225,7 +226,7 @@ class CompactedZone:
         ]
         tangents = {"ln_p_m": by_strength}
         for name, point in perturbations.items():
-            moved = see(response.code(point.amplitudes), point.instruments[observed.name])
+            moved = see(response.features(point.amplitudes), point.instruments[observed.name])
             tangents[name] = (moved - here) / point.step
         pull = (log_speed - math.log(observed.scan.speed.value)) / self.spread
         return LinearisedZone(

@@ -49,14 +49,14 @@ class DropModel:
         """m, on the stated scale."""
         return max(self.camera.surface_row_sigma * self.observed.pixel, LEAST_SURFACE)
 
-    def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
-        """Stated depth (m) at the compared points, (points,), of an encoded curve."""
+    def predict(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+        """Stated depth (m) at the compared points, (points,), from the features of a run."""
         offset = instrument.row_offset_px * self.observed.pixel
-        return self.matrix @ predict_depth(code, self.observed.time, instant, instrument, offset)
+        return self.matrix @ predict_depth(features, self.observed.time, instant, instrument, offset)
 
-    def predict_speed(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
-        """Stated speed (m/s) at the compared points, (points,), of an encoded curve."""
-        return self.matrix @ predict_speed(code, self.observed.time, instant, instrument)
+    def predict_speed(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+        """Stated speed (m/s) at the compared points, (points,), from the features of a run."""
+        return self.matrix @ predict_speed(features, self.observed.time, instant, instrument)
 
     @property
     def data(self) -> FloatArray:
@@ -97,9 +97,9 @@ class DropModel:
         """(n, n) that turns errors of the data into m."""
         return np.eye(self.matrix.shape[0])
 
-    def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+    def by_contact(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Derivative of ``predict`` by the contact time, m/s."""
-        return -self.predict_speed(code, instrument, instant)
+        return -self.predict_speed(features, instrument, instant)
 
     @property
     def own_errors(self) -> FloatArray:
@@ -124,7 +124,7 @@ class DropModel:
     unit = "m"
 
     def slope(
-        self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
+        self, features: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
     ) -> FloatArray:
         """What the solver may be off by a share of from shallow to deep drops, m."""
         return np.maximum(here, 0.0)

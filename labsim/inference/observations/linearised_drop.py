@@ -118,21 +118,21 @@ def linearise_drop(
     instrument = nominal.instruments[name]
     lp = log_p_m + nominal.log_offsets.get(name, 0.0)
     response = model.table.at(lp, instant.log_speed)
-    code = response.code(nominal.amplitudes)
-    here = model.predict(code, instrument, instant)
-    by_contact = model.by_contact(code, instrument, instant)
+    features = response.features(nominal.amplitudes)
+    here = model.predict(features, instrument, instant)
+    by_contact = model.by_contact(features, instrument, instant)
     faster = instant._replace(log_speed=instant.log_speed + 1e-3)
-    fast_code = model.table.code(lp, faster.log_speed, nominal.amplitudes)
-    by_speed = (model.predict(fast_code, instrument, faster) - here) / 1e-3
-    strong_code = model.table.code(lp + 1e-2, instant.log_speed, nominal.amplitudes)
-    by_strength = (model.predict(strong_code, instrument, instant) - here) / 1e-2
+    fast_features = model.table.features(lp, faster.log_speed, nominal.amplitudes)
+    by_speed = (model.predict(fast_features, instrument, faster) - here) / 1e-3
+    strong_features = model.table.features(lp + 1e-2, instant.log_speed, nominal.amplitudes)
+    by_strength = (model.predict(strong_features, instrument, instant) - here) / 1e-2
 
     tangents = {"ln_p_m": by_strength}
     for perturbation, point in perturbations.items():
         there = log_p_m + point.log_offsets.get(name, 0.0)
         at = response if there == lp else model.table.at(there, instant.log_speed)
-        moved = at.code(point.amplitudes)
-        if np.array_equal(moved, code) and point.instruments[name] == instrument:
+        moved = at.features(point.amplitudes)
+        if np.array_equal(moved, features) and point.instruments[name] == instrument:
             tangents[perturbation] = np.zeros(n)
         else:
             tangents[perturbation] = (
@@ -146,35 +146,35 @@ def linearise_drop(
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
-    final, stop = np.exp(code[0]), np.exp(code[1])
+    final, stop = np.exp(features[0]), np.exp(features[1])
     local = np.column_stack([*columns, own_errors[:, 1:]])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
 
     def differ(factor: str) -> FloatArray:
         changed = instrument.replace(**{factor: getattr(instrument, factor) * 1.001})
-        return (model.predict(code, changed, instant) - here) / 1e-3
+        return (model.predict(features, changed, instant) - here) / 1e-3
 
     # two codes part slowly from shallow to deep drops: the one is too deep at one end, too shallow at the other. Depth counts in
     # tip radii, thus in spacings: with it, drops of all sizes, speeds and hidden effects lie on one curve, with speed they do not
-    reach = float(code[0]) - math.log(model.radius)
+    reach = float(features[0]) - math.log(model.radius)
     clock = model.mean_time(instrument) - instant.contact_time
     shared = {
         **model.share(here, differ, (budget.pixel_scale, budget.frame_scale, budget.contact_offset)),
-        "numerical slope": model.slope(code, instrument, instant, here)
+        "numerical slope": model.slope(features, instrument, instant, here)
         * (reach - USUAL_DEPTH)
         * budget.numerical_slope,
         "numerical strength": by_strength * budget.numerical_strength,
     }
     for setting, (amplitude, sigma) in model.numerics.items():
         if model.table.knows(setting):
-            moved = model.predict(code + response.change(setting, amplitude), instrument, instant)
+            moved = model.predict(features + response.change(setting, amplitude), instrument, instant)
             shared[f"numerical {setting}"] = (moved - here) * (sigma / amplitude)
     if with_others:
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
     off, length, changes = model.find_solver_error(here, clock, final, instrument, budget.numerical)
-    if model.changes_differ and code is not response.plain:
+    if model.changes_differ and features is not response.plain:
         change = here - model.predict(response.plain, instrument, instant)
         off = np.hypot(off, budget.numerical_change * change)
     numerical = NumericalError(

@@ -25,7 +25,7 @@ from .observe_push import Ground, ObservedPush
 PROFILE = 3.0  # of ln strength in each window, prior width: as good as free
 
 
-def encode_push(run: DropRun | Push, whole: bool) -> FloatArray:
+def extract_push(run: DropRun | Push, whole: bool) -> FloatArray:
     """(2,): ln of the resistance, Pa on the tip's section, mean over the way by the driver's work: forces of single steps are
     noisy. A nought where a drop has its stop. whole : with what holds the shaft."""
     radius = run.setting.projectile.tip_radius
@@ -92,14 +92,14 @@ class PushModel:
         """(n, n): errors of the data are relative ones as they are."""
         return np.eye(self.data.size)
 
-    def predict(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+    def predict(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """ln of the resistance over 1 Pa where the profile has its reference, (n,)."""
         # the profile makes up for what differs with depth: the resistance is as large as it was measured
         measured = np.exp(self.data)
         read = instrument.stated_resistance(measured, self.observed.depth, float(np.exp(instant.log_speed)))
-        return code[0] + np.log(np.maximum(read, 0.01 * measured) / measured)
+        return features[0] + np.log(np.maximum(read, 0.01 * measured) / measured)
 
-    def by_contact(self, code: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
+    def by_contact(self, features: FloatArray, instrument: Instrument, instant: Instant) -> FloatArray:
         """Nothing depends on when it began."""
         return np.zeros(self.data.size)
 
@@ -129,7 +129,7 @@ class PushModel:
         return {**profile, "gauge": np.full(self.data.size, gauge.scale_sigma)}
 
     def slope(
-        self, code: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
+        self, features: FloatArray, instrument: Instrument, instant: Instant, here: FloatArray
     ) -> FloatArray:
         """What the solver may be off by from shallow to deep drops: it is pushed to one depth."""
         return np.zeros(self.data.size)

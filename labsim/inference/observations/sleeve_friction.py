@@ -44,7 +44,7 @@ class Spread:
     rest: float
 
 
-def encode_sleeve(run: DropRun | Push) -> FloatArray:
+def extract_sleeve(run: DropRun | Push) -> FloatArray:
     """(1,): the friction ratio of a run's own shaft."""
     radius, shaft = run.setting.projectile.tip_radius, float(run.shaft_work[-1])
     way = float(run.depth[-1] - run.depth[0])
@@ -96,10 +96,10 @@ class TipSleeves:
     ) -> FloatArray:
         """The ratio that the gauges of one record should read, (windows,)."""
         at = log_p_m + point.log_offsets.get(push.name, 0.0)
-        code = self.features.table.code(at, math.log(push.impact_speed), amplitudes)
+        features = self.features.table.features(at, math.log(push.impact_speed), amplitudes)
         measured = np.exp(push.resistance)
         read = self._instrument(point, push).stated_resistance(measured, push.depth, push.impact_speed)
-        return code[0] * measured / np.maximum(read, 0.01 * measured)
+        return features[0] * measured / np.maximum(read, 0.01 * measured)
 
     def _instrument(self, point: Perturbation, push: ObservedPush) -> Instrument:
         return point.instruments[push.name]

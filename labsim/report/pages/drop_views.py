@@ -174,9 +174,9 @@ def _view_acceleration(
     simulated, ends = {}, {"": model.deepest}
     for (name, fit), own in zip(fits, instants, strict=True):
         log_p_m = fit.log_p_m + problem.log_offsets(fit.values)[observed.name]
-        code = model.table.code(log_p_m, own.log_speed, fit.values)
-        simulated[name] = model.predict(code, problem.instruments(fit.values)[observed.name], own)
-        ends[name] = math.exp(float(code[0]))
+        features = model.table.features(log_p_m, own.log_speed, fit.values)
+        simulated[name] = model.predict(features, problem.instruments(fit.values)[observed.name], own)
+        ends[name] = math.exp(float(features[0]))
     last = model.lengths[-1]
     # measured depth at the stop: that of the first fit and what the record integrates to beyond it
     ends[""] = ends[fits[0][0]] + float(last @ (model.data - simulated[fits[0][0]]))
@@ -207,11 +207,11 @@ def predict_drop(
     name = model.observed.name
     instrument = problem.instruments(fit.values)[name]
     log_p_m = fit.log_p_m + problem.log_offsets(fit.values)[name]
-    code = model.table.code(log_p_m, instant.log_speed, fit.values)
+    features = model.table.features(log_p_m, instant.log_speed, fit.values)
     offset = instrument.row_offset_px * model.observed.pixel
     offset += contact * model.radius
     time = model.observed.time
-    return predict_depth(code, time, instant, instrument, offset)
+    return predict_depth(features, time, instant, instrument, offset)
 
 
 def contact_offset(problem: Problem, fit: Fit) -> float:

@@ -45,10 +45,10 @@ def view_maps(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> list[MapView
         observed = scan.observed
         simulated = {}
         for name, fit in fits:
-            code = scan.table.code(fit.log_p_m, float(fit.nuisances[number][place]), fit.values)
+            features = scan.table.features(fit.log_p_m, float(fit.nuisances[number][place]), fit.values)
             scale = problem.instruments(fit.values)[observed.name].ct_scale
             full = np.full(observed.cells.shape, np.nan)
-            full[observed.cells] = scale * code[1:]
+            full[observed.cells] = scale * features[1:]
             simulated[name] = full
         views.append(MapView(observed.name, observed.reduced.map, observed.undisturbed, simulated))
     return views
