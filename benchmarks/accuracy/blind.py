@@ -73,6 +73,8 @@ def describe(name: str, found: Diagnosis) -> dict:
         "p_m": float(np.median(p_m)),
         "p_m_90": tuple(np.quantile(p_m, [0.05, 0.95])),
         "ln_p_m_sd": float(np.std(np.log(p_m))),
+        "p_m_over_causes": float(np.median(found.p_m_averaged)),
+        "p_m_over_causes_90": tuple(np.quantile(found.p_m_averaged, [0.05, 0.95])),
         "p_m_nominal": float(np.median(nominal)),
         "gain": found.gain.fraction_removed,
         "alike": found.alike,
@@ -182,6 +184,7 @@ def score(rows: list[dict]) -> pd.DataFrame:
         alike = {row["first"], *row["alike"]}  # the stated class
         probabilities = dict(row["ranked"])
         low, high = row["p_m_90"]
+        over = row.get("p_m_over_causes_90")  # rows before 2026-11-28 have none
         table.append(
             {
                 "campaign": row["campaign"],
@@ -203,6 +206,7 @@ def score(rows: list[dict]) -> pd.DataFrame:
                 "ln p_m off": round(math.log(row["p_m"] / known["pm"]), 3),
                 "sd": round(row["ln_p_m_sd"], 3),
                 "in 90 %": low <= known["pm"] <= high,
+                "in 90 % over causes": None if over is None else over[0] <= known["pm"] <= over[1],
                 "gain": round(row["gain"], 2),
                 "scatter": known.get("scatter", SCATTER),
                 "sigmas": round(row["sigmas"], 1),
