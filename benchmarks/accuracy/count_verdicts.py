@@ -50,9 +50,8 @@ def main() -> None:
     count("unlisted: unknown, or nothing above 0.5", quiet[unlisted])
     count("all: a wrong cause above 0.5", table["wrong>0.5"])
     count("p_m in its 90 % interval, nothing hidden", table["in 90 %"][null])
-    said = ~null & (
-        table["first"] != "unknown"
-    )  # where the verdict is unknown, p_m is said not to be measured
+    # where the verdict is unknown, p_m is said not to be measured
+    said = ~null & (table["first"] != "unknown")
     count("p_m in its 90 % interval, something hidden, the first cause fitted", table["in 90 %"][said])
     count("… over all causes that are not excluded", table["in 90 % over causes"][said].dropna())
     print(f"\nexpected calibration error {draw_reliability(table)[1]:.3f}")

@@ -28,7 +28,9 @@ OF_THE_PARENT = (
     signal.SIGINT,
     signal.SIGTERM,
 )  # a terminal or a batch system sends them to all processes at once
-Call = tuple[Future, Callable[..., Any], tuple, dict]
+Call = tuple[
+    Future, Callable[..., Any], tuple, dict, str
+]  # the last is the folder that relative paths are of
 
 
 class ProcessWorkers(Executor):
@@ -55,7 +57,7 @@ class ProcessWorkers(Executor):
             self._unfinished += 1
             begins = self._threads < min(self._count, self._unfinished)
             self._threads += begins
-        self._calls.put((future, fn, args, kwargs))
+        self._calls.put((future, fn, args, kwargs, os.getcwd()))
         if begins:  # a daemon: the interpreter ends without waiting for it
             threading.Thread(target=self._serve, name="labsim-worker", daemon=True).start()
         return future
@@ -92,11 +94,11 @@ class ProcessWorkers(Executor):
             signal.pthread_sigmask(signal.SIG_BLOCK, OF_THE_PARENT)
         worker: tuple[SpawnProcess, Connection] | None = None
         while (call := self._calls.get()) is not None:
-            future, fn, args, kwargs = call
+            future, *asked = call
             if future.set_running_or_notify_cancel():
                 try:
                     worker = worker or self._start()
-                    future.set_result(_ask(*worker, (fn, args, kwargs)))
+                    future.set_result(_ask(*worker, asked))
                 except BaseException as trouble:
                     future.set_exception(trouble)
             with self._lock:
@@ -115,7 +117,7 @@ class ProcessWorkers(Executor):
         return process, ours
 
 
-def _ask(process: SpawnProcess, pipe: Connection, call: tuple) -> Any:
+def _ask(process: SpawnProcess, pipe: Connection, call: list) -> Any:
     """What a call returns, or raise what it raised. Raises BrokenExecutor where the worker is gone."""
     try:
         pipe.send(call)
@@ -155,11 +157,12 @@ def _work(pipe: Connection) -> None:
 def _answer(pipe: Connection) -> None:
     while True:
         try:
-            fn, args, kwargs = pipe.recv()
+            fn, args, kwargs, folder = pipe.recv()
         except EOFError:
             return
         result, trouble = None, None
         try:
+            os.chdir(folder)  # a worker may be older than the caller's last change of it
             result = fn(*args, **kwargs)
         except Exception as found:
             trouble = found

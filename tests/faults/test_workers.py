@@ -63,6 +63,17 @@ def test_workers_do_the_calls_and_say_what_went_wrong() -> None:
         workers.submit(pow, 2, 2)
 
 
+def test_a_worker_follows_its_caller_into_another_folder(tmp_path: Path, monkeypatch) -> None:
+    workers = ProcessWorkers(1)
+    try:
+        for name in ("one", "two"):
+            (tmp_path / name).mkdir()
+            monkeypatch.chdir(tmp_path / name)
+            assert workers.submit(os.getcwd).result(60) == str(tmp_path / name)
+    finally:
+        workers.end()
+
+
 def test_what_was_not_begun_is_cancelled() -> None:
     workers = ProcessWorkers(1)
     calls = [workers.submit(time.sleep, 60.0) for _ in range(3)]
