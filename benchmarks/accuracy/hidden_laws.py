@@ -17,6 +17,7 @@ WHERE = {
     "clock of row": CAMERA,
     "clock of time": CAMERA,
     "mass of depth": MASS,
+    "gathered mass of depth": MASS,
     "strength of filling factor": STRENGTH,
     "strength of plastic strain": STRENGTH,
     "shear strength of plastic strain": STRENGTH,
@@ -60,8 +61,10 @@ def find_law(truth: dict) -> HiddenLaw | None:
         return HiddenLaw((DEPTH,), {"constant_pressure": None})  # a force that does not grow with the tip
     if "film" in forces:
         return HiddenLaw((DEPTH,), films)
-    if "gathered" in forces or "accrete" in forces:
-        return HiddenLaw((MASS,), {"stuck_mass": forces.get("gathered", forces.get("accrete"))})
+    if "gathered" in forces:
+        return HiddenLaw((MASS,), {"gathered_mass": forces["gathered"]})
+    if "accrete" in forces:
+        return HiddenLaw((MASS,), {"stuck_mass": forces["accrete"], "gathered_mass": forces["accrete"]})
     if "interface" in dust:
         return HiddenLaw((DEPTH, SAMPLE), films)
     if profile == "layers":

@@ -76,7 +76,7 @@ def _hold_out(
     precision = np.zeros((len(names), len(names)))
     pull = np.zeros(len(names))
     for k, name in enumerate(names[1:], start=1):
-        width = problem.effects[name].amplitudes[0].scale
+        width, _ = problem.effects[name].amplitudes[0].stand_in(fit.values[name])
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
     for block in fit.blocks[1:]:  # only drops are held out

@@ -22,12 +22,13 @@ from .contract import (
 )
 from .loading import CATALOGUE, list_effects, load_effect, load_file, reference_campaign
 from .model import Model, apply_effects, apply_model, check_model, make_instrument, read_model, write_model
-from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
+from .priors import Cauchy, HalfNormal, LogNormal, Normal, Prior, Uniform
 
 __all__ = [
     "CATALOGUE",
     "KINDS",
     "OBSERVABLES",
+    "Cauchy",
     "Effect",
     "HalfNormal",
     "Instrument",

@@ -29,7 +29,7 @@ from ..records import (
     Scan,
 )
 from ..sph import DropSetting
-from .priors import HalfNormal, LogNormal, Normal, Prior, Uniform
+from .priors import Cauchy, HalfNormal, LogNormal, Normal, Prior, Uniform
 
 Kind = Literal["material", "sample", "contact", "projectile", "measurement", "numerics"]
 KINDS: tuple[Kind, ...] = ("material", "sample", "contact", "projectile", "measurement", "numerics")
@@ -100,6 +100,14 @@ class Parameter:
             return self.null, 1.0
         return (self.doubles, self.doubles) if math.isfinite(self.doubles) else None
 
+    def stand_in(self, amplitude: float) -> tuple[float, float]:
+        """Width of the Gaussian about null that falls as steeply as the prior at an amplitude; ln of the prior there over that at
+        null. A Cauchy law falls with 2 x / (s² + x²)."""
+        if isinstance(self.prior, Cauchy):
+            ratio = amplitude / self.prior.sd
+            return self.prior.sd * math.sqrt(0.5 * (1.0 + ratio**2)), -math.log1p(ratio**2)
+        return self.scale, -0.5 * (amplitude / self.scale) ** 2
+
     def draw(self, rng: np.random.Generator) -> float:
         """A value from the prior between the limits."""
         below, above = (float(self.prior.cdf(limit)) for limit in self.limits)
@@ -108,7 +116,10 @@ class Parameter:
 
     @property
     def scale(self) -> float:
-        """How far from null the prior expects the value (root mean square): the unit of dimensionless amplitudes."""
+        """How far from null the prior expects the value (root mean square; of a Cauchy law, that has none, its half width): the
+        unit of dimensionless amplitudes."""
+        if isinstance(self.prior, Cauchy):
+            return self.prior.sd
         low, high = (float(self.prior.cdf(limit)) for limit in self.limits)
         quantiles = low + (high - low) * (np.arange(400) + 0.5) / 400
         return float(np.sqrt(np.mean((self.prior.ppf(quantiles) - self.null) ** 2)))
@@ -399,6 +410,7 @@ def deepest_dust(campaign: Campaign) -> float:
 __all__ = [
     "KINDS",
     "OBSERVABLES",
+    "Cauchy",
     "Effect",
     "HalfNormal",
     "Instrument",

@@ -1,6 +1,7 @@
 """Where the equations, or the clock of a camera, have a place for a law that is not in them, one record each.
 
-    m (1 + d(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) exp(f(a)), Y (1 + h(ε))] - A b(z/a) - A c(v)
+    m (1 + d(z/a) + k(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) exp(f(a)), Y (1 + h(ε))]
+                                           - A b(z/a) - A c(v) - m k'(z/a) v²/a
 
 m is the mass of the projectile, A the cross-section of its tip, a its radius, ε the plastic shear strain of the dust. A force is
 a pressure, so that one law holds for all sizes.
@@ -97,10 +98,15 @@ def _add_pressure_of_speed(setting: DropSetting, table: Knots) -> DropSetting:
     )
 
 
-def _add_mass(setting: DropSetting, table: Knots) -> DropSetting:
-    radius, mass = setting.projectile.tip_radius, setting.projectile.mass
-    table = tuple((knot * radius, value * mass) for knot, value in table)
-    return setting.replace(mass_of_depth=combine(setting.mass_of_depth, table))
+def _add_mass(key: str) -> Callable[[DropSetting, Knots], DropSetting]:
+    """What adds a share of the projectile's mass, over depth in tip radii, to the masses that the setting's key holds."""
+
+    def add(setting: DropSetting, table: Knots) -> DropSetting:
+        radius, mass = setting.projectile.tip_radius, setting.projectile.mass
+        table = tuple((knot * radius, value * mass) for knot, value in table)
+        return setting.replace(**{key: combine(getattr(setting, key), table)})
+
+    return add
 
 
 def _add_size(setting: DropSetting, table: Knots) -> DropSetting:
@@ -162,7 +168,12 @@ LAW_PLACES = {
         LawPlace(
             "mass of depth", "depth", "tip radii", "1",
             "dust that moves with the tip, over the mass of the projectile, of", "mass that sticks", "%",
-            12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass,
+            12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass("mass_of_depth"),
+        ),
+        LawPlace(
+            "gathered mass of depth", "depth", "tip radii", "1",
+            "dust that lies still until the tip takes it along, over the mass of the projectile, of", "mass that is gathered",
+            "%", 12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass("gathered_of_depth"),
         ),
         LawPlace(
             "strength of size", "radius of the tip", "mm", "1",

@@ -30,7 +30,7 @@ from ..records import (
 )
 from ..sph.materials import list_numbers
 from .contract import KINDS, OBSERVABLES, Effect, Parameter
-from .priors import HalfNormal, LogNormal, Normal, Uniform
+from .priors import Cauchy, HalfNormal, LogNormal, Normal, Uniform
 
 CATALOGUE = Path(__file__).parent / "catalogue"
 _loaded: dict[tuple[Path, int], Effect] = {}
@@ -309,8 +309,8 @@ def _check_parameters(file: Path, module: types.ModuleType, campaign: Campaign) 
             refuse(
                 f"null + step = {null + step:g} lies outside the limits {low:g} to {high:g}; shorten or turn the step"
             )
-        if not isinstance(parameter.prior, (Normal, HalfNormal, LogNormal, Uniform)):
-            refuse(f"prior {parameter.prior!r} is not Normal, HalfNormal, LogNormal or Uniform")
+        if not isinstance(parameter.prior, (Normal, Cauchy, HalfNormal, LogNormal, Uniform)):
+            refuse(f"prior {parameter.prior!r} is not Normal, Cauchy, HalfNormal, LogNormal or Uniform")
         if not parameter.prior.sd > 0.0:
             refuse(f"prior {parameter.prior!r} needs a positive width")
         if not float(parameter.prior.cdf(high) - parameter.prior.cdf(low)) > 1e-6:

@@ -1,4 +1,4 @@
-"""What is believed of a parameter before this campaign: four laws, frozen and small.
+"""What is believed of a parameter before this campaign: five laws, frozen and small.
 
 Each has logpdf, cdf, ppf (arrays in, arrays out), sd, sample(rng) and describe(). Parameter cuts them off at its limits.
 """
@@ -37,6 +37,29 @@ class Normal:
 
     def describe(self) -> str:
         return f"{self.mean:.4g} ± {self.sd:.3g}"
+
+
+@dataclass(frozen=True)
+class Cauchy:
+    """Nobody knows how large it is: half of it lies within ``sd`` of ``centre``, a sixteenth beyond ten times that."""
+
+    centre: float
+    sd: float
+
+    def logpdf(self, x: Values) -> np.ndarray:
+        return -np.log1p(((np.asarray(x) - self.centre) / self.sd) ** 2) - math.log(math.pi * self.sd)
+
+    def cdf(self, x: Values) -> np.ndarray:
+        return np.asarray(0.5 + np.arctan((np.asarray(x) - self.centre) / self.sd) / math.pi)
+
+    def ppf(self, q: Values) -> np.ndarray:
+        return np.asarray(self.centre + self.sd * np.tan(math.pi * (np.asarray(q) - 0.5)))
+
+    def sample(self, rng: np.random.Generator) -> float:
+        return self.centre + self.sd * float(rng.standard_cauchy())
+
+    def describe(self) -> str:
+        return f"{self.centre:.4g} ± {self.sd:.3g}, or many times that"
 
 
 @dataclass(frozen=True)
@@ -132,4 +155,4 @@ class Uniform:
         return f"{self.low:.3g} to {self.high:.3g}"
 
 
-Prior = Normal | HalfNormal | LogNormal | Uniform
+Prior = Normal | Cauchy | HalfNormal | LogNormal | Uniform

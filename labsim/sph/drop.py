@@ -93,6 +93,7 @@ def evolve(
         *_split(setting.force_of_depth, force_scale),
         *_split(setting.force_of_speed, force_scale),
         *_split(setting.mass_of_depth, force_scale),
+        *_split(setting.gathered_of_depth, force_scale),
         *path,
     )
     log = np.zeros((4096, len(LOG)))

@@ -77,8 +77,9 @@ class DropSetting:
         Filling factor and factor on Σ; tables are linear between their rows.
     strength_of_strain, shear_of_strain : tuple of (float, float)
         Plastic shear strain and factor on Σ, or on Y.
-    force_of_depth, force_of_speed, mass_of_depth : tuple of (float, float)
-        m and N upwards; m/s and N against the motion; m and kg of dust that move with the tip.
+    force_of_depth, force_of_speed, mass_of_depth, gathered_of_depth : tuple of (float, float)
+        m and N upwards; m/s and N against the motion; m and kg of dust that move with the tip: it has the tip's speed when it
+        sticks, or lies still, so that the tip gives it its momentum.
     """
 
     projectile: Projectile
@@ -113,6 +114,9 @@ class DropSetting:
     mass_of_depth: tuple[
         tuple[float, float], ...
     ] = ()  # (depth m, kg of dust that move with the tip), linear between
+    gathered_of_depth: tuple[
+        tuple[float, float], ...
+    ] = ()  # the same, of dust that lies still until the tip takes it along
 
     def replace(self, **changes: object) -> DropSetting:
         return replace(self, **changes)  # type: ignore[arg-type]

@@ -97,6 +97,8 @@ class Outside(NamedTuple):
     speed_force: FloatArray
     mass_knots: FloatArray  # m
     stuck: FloatArray  # kg
+    gathered_knots: FloatArray  # m
+    gathered: FloatArray  # kg
     path_time: FloatArray
     path_depth: FloatArray
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from labsim.diagnosis.unlisted.learned_law import (
     MOST_WEIGHED,
     choose_formulas,
     share_hats,
+    share_places,
     weigh_formulas,
 )
 from labsim.effects.law_places import LAW_PLACES
@@ -53,6 +56,19 @@ def test_the_hidden_term_comes_first_with_its_size(name):
     assert names == (name,)
     sigma = np.sqrt(marginal.covariance[1, 1])
     assert abs(marginal.coefficients[1] - 0.5) < 3 * sigma and sigma < 0.05
+
+
+@pytest.mark.parametrize("name", ["depth_spring", "inertial_drag"])
+def test_a_term_many_times_its_usual_size_is_found(name):
+    names, marginal = weigh_formulas(made_up({name: 6.0}), TERMS, UNITS, LIMITS)[0]
+    assert names == (name,) and marginal.coefficients[1] == pytest.approx(6.0, rel=0.05)
+
+
+def test_places_are_as_likely_as_one_another_however_many_terms_they_have():
+    priors = share_places(TERMS)
+    for law in LAWS:
+        own = [math.exp(priors[name]) for name, term in TERMS.items() if term.place == law.name]
+        assert sum(own) == pytest.approx(1.0) and len(set(own)) == 1
 
 
 def test_two_hidden_terms_are_named_together():

@@ -12,10 +12,13 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.effects import (
     CATALOGUE,
+    Cauchy,
     HalfNormal,
     Instrument,
     LogNormal,
     Normal,
+    Parameter,
+    Prior,
     Uniform,
     deepest_dust,
     list_effects,
@@ -224,13 +227,15 @@ def test_the_catalogue_fits_other_laboratories(phi: float, phi_2: float) -> None
 
 
 @pytest.mark.parametrize(
-    "prior", [Normal(1.0, 0.3), HalfNormal(2.0, 0.5), LogNormal(3.0, 0.6), Uniform(-1.0, 4.0)]
+    "prior",
+    [Normal(1.0, 0.3), Cauchy(1.0, 0.3), HalfNormal(2.0, 0.5), LogNormal(3.0, 0.6), Uniform(-1.0, 4.0)],
 )
-def test_priors_agree_with_themselves(prior: Normal | HalfNormal | LogNormal | Uniform) -> None:
+def test_priors_agree_with_themselves(prior: Prior) -> None:
     from scipy import stats
 
     twin = {
         Normal: lambda: stats.norm(1.0, 0.3),
+        Cauchy: lambda: stats.cauchy(1.0, 0.3),
         HalfNormal: lambda: stats.halfnorm(0.5, 2.0),
         LogNormal: lambda: stats.lognorm(0.6, scale=3.0),
         Uniform: lambda: stats.uniform(-1.0, 5.0),
@@ -244,6 +249,18 @@ def test_priors_agree_with_themselves(prior: Normal | HalfNormal | LogNormal | U
     draws = [prior.sample(rng) for _ in range(4000)]
     assert stats.kstest(draws, twin.cdf).pvalue > 1e-3
     assert prior.describe()
+
+
+def test_what_stands_in_for_a_cauchy_prior_falls_as_it_does() -> None:
+    """A fit that follows the Gaussian about null, anew at every step, ends at the top of the prior itself."""
+    parameter = Parameter("mass", "kg", 0.0, (-1e3, 1e3), Cauchy(0.0, 2.0), 0.1, "no reason")
+    for amplitude in (-30.0, -1.0, 0.5, 8.0):
+        width, log_ratio = parameter.stand_in(amplitude)
+        slope = np.diff(parameter.log_prior(amplitude + np.array([-1e-5, 1e-5])))[0] / 2e-5
+        assert -amplitude / width**2 == pytest.approx(slope, rel=1e-6)
+        assert log_ratio == pytest.approx(float(parameter.log_prior(amplitude) - parameter.log_prior(0.0)))
+    gaussian = dataclasses.replace(parameter, prior=Normal(0.0, 2.0))
+    assert gaussian.stand_in(3.0) == (pytest.approx(2.0, rel=0.01), pytest.approx(-0.5 * 1.5**2, rel=0.02))
 
 
 def test_the_deepest_dust_is_that_of_the_softest_run() -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...effects import Effect, Instrument, Normal, Parameter, Place
+from ...effects import Cauchy, Effect, Instrument, Normal, Parameter, Place
 from ...effects.contract import ChangeSetting
 from ...effects.law_places import LAW_PLACES, Knots, LawPlace
 from ...effects.terms import KNOTS, Term, add_term, list_terms, see_term
@@ -29,7 +29,7 @@ from ...records import Campaign, FloatArray
 from ...sph import DropSetting
 
 STEP = 0.3  # of a hat when it is simulated
-USUAL = 0.4  # of a law's scale: standard deviation of a coefficient's prior where its term is largest
+USUAL = 0.4  # of a law's scale: half of the coefficients are within that, where their terms are largest
 FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
 
 
@@ -189,7 +189,9 @@ def make_effect(term: Term, unit: float) -> Effect:
     """A term as an effect of one campaign. unit : coefficient that changes as much as the free law's unit where it is largest."""
     low, high = (min(max(limit, -1e9), 1e9) for limit in term.limits)
     parameter = Parameter(
-        "coefficient", term.unit, 0.0, (low, high), Normal(0.0, USUAL * unit), STEP * unit, "of the free law's unit"
+        "coefficient", term.unit, 0.0, (low, high), Cauchy(0.0, USUAL * unit), STEP * unit, "of the free law's unit",
+        # a strength that is left, not one that is more, is what can be many times another
+        doubles=unit if -1.0 < term.acts.least < 0.0 else math.inf,
     )  # fmt: skip
 
     def change(setting: DropSetting, values: Mapping[str, float], place: object) -> DropSetting:

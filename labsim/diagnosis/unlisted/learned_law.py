@@ -8,6 +8,7 @@ fitted as any cause is. Formulas and figures: docs/learned-law.md.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis,
 from ...inference.fits.refine import list_large_effects, refine
 from ...inference.problem import Problem
 from ...records import FloatArray
-from ..explore import FACTORS, fit_from_strengths
+from ..explore import FACTORS, NOWHERE, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import SIZES, Marginal, Tangents, integrate
@@ -33,11 +34,11 @@ MOST_SIMULATED = (
     4  # of them, those that get as far as the best by ROUGH: ln evidence, which few runs give to some twenty
 )
 ROUGH = 60.0
-MOST_SIBLINGS = 2  # of the same place as the best, likewise
+MOST_SIBLINGS = 2  # of the places of the best and of those hardly told from it, likewise
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
-MOST_ANEW, SHARES = 2, (1.0, 2.0, 4.0, 8.0)
+MOST_ANEW, SHARES = 2, (1.0, 4.0)
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
 
@@ -85,6 +86,7 @@ def learn_law(problem: Problem, nominal: Fit, tangents: Tangents, before: HeldOu
     before : the nominal model's predictions of held-out drops.
     """
     free, terms, units = add_terms(problem, tangents.laws)
+    free = replace(free, shape_evidence={**free.shape_evidence, **share_places(terms)})
     low, high = (math.log(p) for p in problem.campaign.p_m_range)
     chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
     fits = fit_formulas(free, nominal, [names for names, _ in chosen], units)
@@ -114,8 +116,13 @@ def fit_formulas(
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
     them among runs about themselves."""
-    sparse: list[Fit] = []
-    for names in chosen:  # before there are more runs, which few ones do not stand beside
+    simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
+    # the others cost nothing, and say how far a formula must come
+    known = [
+        _fit(problem, names, (nominal.log_p_m, {}), nominal) for names in chosen if names not in simulated
+    ]
+    sparse = [fit for fits in known for fit in fits]
+    for names in simulated:  # before there are more runs, which few ones do not stand beside
         top = max([nominal.evidence, *(fit.evidence for fit in sparse)])
         with suppress(LabsimError):
             found = fit_from_strengths(problem, nominal, names, top)
@@ -123,9 +130,10 @@ def fit_formulas(
     fits = _refine(problem, sparse, MOST_SIMULATED)
     best = max(fits, key=lambda fit: fit.evidence, default=nominal)
     if fit_p_value(best) < REJECTED:
-        singles = [names for names in chosen if len(names) == 1 and problem.affects_simulation(*names)]
-        fits = take_better(fits, fit_anew(problem, nominal, singles, units))
-    fits += fit_siblings(problem, fits, units)
+        near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
+        singles = [names for names in simulated if len(names) == 1 and names in near]
+        fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
+    fits = take_better([*fits, *fit_siblings(problem, fits, units)])
     fits.sort(key=lambda fit: -fit.evidence)
     for k, fit in enumerate(fits[:MOST_REFINED]):
         if list_large_effects(problem, fit):
@@ -173,28 +181,32 @@ def _start(problem: Problem, name: str, log_p_m: float, size: float, nominal: Fi
 
 
 def fit_siblings(problem: Problem, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
-    """The other terms of the place of the best single one, begun where that one ended and as large: which form a law has cannot
-    be told about a p_m that is far from the truth's."""
-    singles = [fit for fit in fits if len(fit.hypothesis) == 1]
-    if not singles:
-        return []
-    best = max(singles, key=lambda fit: fit.evidence)
-    (own,) = best.hypothesis
-    place, size = list_terms()[own].place, best.values[own] / units[own]
+    """The other terms of the places that the best formula, and those hardly told from it, have terms at; begun where that formula
+    ended and as large: which form a law has cannot be told about a p_m that is far from the truth's."""
+    ranked = sorted(fits, key=lambda fit: -fit.evidence)
+    begun: dict[str, tuple[Fit, float]] = {}
+    for fit in ranked:
+        for own in fit.hypothesis if fit.evidence > ranked[0].evidence - ALIKE else ():
+            begun.setdefault(list_terms()[own].place, (fit, fit.values[own] / units[own]))
     tried = {fit.hypothesis for fit in fits}
     sparse = []
     for name in units:
-        if list_terms()[name].place == place and (name,) not in tried:
+        term = list_terms()[name]
+        if term.place in begun and (name,) not in tried:
+            best, size = begun[term.place]
+            few = (
+                term.acts.over != "depth"
+            )  # what a force at one depth changes has a peak where drops end there
             with suppress(LabsimError):
                 begin = (best.log_p_m, {name: size * units[name]})
-                sparse.append(fit_hypothesis(problem, (name,), begin, sparse=True, nuisances=best))
+                sparse.append(fit_hypothesis(problem, (name,), begin, sparse=few, nuisances=best))
     return _refine(problem, sparse, MOST_SIBLINGS)
 
 
-def take_better(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
-    """One fit of each hypothesis, that with more evidence."""
+def take_better(fits: Sequence[Fit]) -> list[Fit]:
+    """One fit of each hypothesis, that with most evidence."""
     found: dict[Hypothesis, Fit] = {}
-    for fit in (*fits, *others):
+    for fit in fits:
         if fit.hypothesis not in found or fit.evidence > found[fit.hypothesis].evidence:
             found[fit.hypothesis] = fit
     return list(found.values())
@@ -234,6 +246,12 @@ def choose_formulas(
     return chosen
 
 
+def share_places(terms: Mapping[str, Term]) -> dict[str, float]:
+    """ln prior of every term: all places are as likely as one another, however many terms somebody has thought of there."""
+    counts = Counter(term.place for term in terms.values())
+    return {name: -math.log(counts[term.place]) for name, term in terms.items()}
+
+
 def share_hats(term: Term, law: FreeLaw) -> FloatArray:
     """Heights of the law's hats whose sum is nearest to the term. Its values at the knots are not: a film between two is lost."""
     places = np.linspace(law.grid[0], max(law.knots), KNOTS)
@@ -260,9 +278,12 @@ def weigh_formulas(
     gram = columns.T @ tangents.gram @ columns
     reduced = replace(tangents, names=("ln_p_m", *terms), gram=gram)
 
+    priors = share_places(terms)
+
     def weigh(names: Sequence[str]) -> tuple[float, Marginal]:
         each = [integrate(reduced, names, size, limits) for size in SIZES]
-        return log_mean([one.evidence for one in each]), max(each, key=lambda one: one.evidence)
+        evidence = log_mean([one.evidence for one in each]) + sum(priors[name] for name in names)
+        return evidence, max(each, key=lambda one: one.evidence)
 
     def allowed(names: Sequence[str], marginal: Marginal) -> bool:
         signs = zip(names, marginal.coefficients[1:], strict=True)

@@ -1,14 +1,14 @@
-"""Dust that sticks to the tip and moves with it, so that the projectile grows heavier on its way.
+"""Dust that moves with the tip, so that the projectile grows heavier on its way.
 
-It has the tip's speed when it sticks, since the tip has pushed it that fast. The coefficient is a share of the projectile's own
-mass.
+What sticks has the tip's speed when it does, since the tip has pushed it that fast. What is gathered lies still until then, and
+the tip gives it its momentum. The coefficient is a share of the projectile's own mass.
 """
 
 import numpy as np
 
 from . import Term
 
-PLACE = "mass of depth"
+PLACE, STILL = "mass of depth", "gathered mass of depth"
 TERMS = (
     Term(
         "stuck_mass", "dust that sticks to the tip, more with every depth", PLACE, "1", "z/a",
@@ -25,5 +25,13 @@ TERMS = (
     Term(
         "stuck_late", "dust that sticks to the tip, ever more with depth", PLACE, "1", "(z/a)²",
         lambda z: z**2, "A cone of dense grains that widens as it grows",
+    ),
+    Term(
+        "gathered_mass", "dust that lies still and is gathered, more with every depth", STILL, "1", "z/a",
+        lambda z: z, "Momentum that grains at rest take up: Katsuragi & Durian (2007)",
+    ),
+    Term(
+        "gathered_cap", "dust that lies still and is gathered in the tip's first radius", STILL, "1", "z/a, at most 1",
+        lambda z: np.minimum(z, 1.0), "Momentum that grains at rest take up: Katsuragi & Durian (2007)",
     ),
 )  # fmt: skip

@@ -32,7 +32,7 @@ class ParameterPoint:
 class Solved:
     """The likelihood about a place, and the Gauss-Newton step from there.
 
-    log_likelihood : of the place itself; log_posterior : with the Gaussians that stand for the priors of amplitudes.
+    log_likelihood : of the place itself; log_posterior : with what stands for the priors of amplitudes.
     """
 
     place: ParameterPoint
@@ -48,14 +48,15 @@ class Solved:
 def solve_at(problem: Problem, place: ParameterPoint) -> Solved:
     """The likelihood about a place with the runs that there are."""
     blocks = linearise_at(problem, place.nuisances, place.log_p_m, place.values)
-    priors = {
-        name: (value, problem.effects[name].amplitudes[0].scale) for name, value in place.values.items()
+    stand_ins = {
+        name: problem.effects[name].amplitudes[0].stand_in(value) for name, value in place.values.items()
     }
+    priors = {name: (place.values[name], width) for name, (width, _) in stand_ins.items()}
     step, covariance, _left, logdet, _weighted = solve_globals(blocks, ("ln_p_m", *place.values), priors)
     chi_square = sum(block.chi_square for block in blocks)
     points = sum(block.residual.size for block in blocks)
     log_likelihood = -0.5 * (chi_square + logdet + points * math.log(2 * math.pi))
-    log_posterior = log_likelihood - 0.5 * sum((away / width) ** 2 for away, width in priors.values())
+    log_posterior = log_likelihood + sum(log_ratio for _, log_ratio in stand_ins.values())
     return Solved(place, blocks, step, covariance, chi_square, points, log_likelihood, log_posterior)
 
 

@@ -6,14 +6,17 @@ which frames belong to the motion, and where the search for contact time and imp
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...errors import MeasurementError
 from ...records import Campaign, DecelerationCurve, Drop, FloatArray, Track
 from ...runs.workers import explain_loss, open_executor
+from ...video.motion.choosing import NOISE_KNOWN
 from ...video.motion.curve import fit_deceleration
 from ...video.track_file import read_track
 from .observe_acceleration import ObservedImpact, observe_impact
@@ -21,6 +24,7 @@ from .observe_push import ObservedPush, observe_push
 
 MARGIN = 4  # frames kept after the depth has stopped growing
 # Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
+DUST_PARAMETERS = 3  # that the rows in the dust tell of a motion; contact and speed are those of free fall
 SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
 
 
@@ -105,6 +109,31 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
     )
 
 
+def judge_noise(seen: Sequence[Observed]) -> list[Observed]:
+    """The drops with the noise that their rows have in the dust, where the stated one is that of all frames at best: light and
+    focus change along a film. The stated error bars count as NOISE_KNOWN frames against all films, these as much against one.
+    """
+    scatter = {each.name: _scatter_in_dust(each) for each in seen if isinstance(each, ObservedDrop)}
+    squares, freedom = np.sum([*scatter.values(), (0.0, 0)], axis=0)
+    common = (squares + NOISE_KNOWN) / (freedom + NOISE_KNOWN)
+    own = {n: (square + NOISE_KNOWN * common) / (free + NOISE_KNOWN) for n, (square, free) in scatter.items()}
+    return [
+        replace(each, sigma=each.sigma * math.sqrt(own[each.name]))
+        if isinstance(each, ObservedDrop)
+        else each
+        for each in seen
+    ]
+
+
+def _scatter_in_dust(drop: ObservedDrop) -> tuple[float, int]:
+    """χ² of the rows between contact and rest about the motion that was fitted to them alone, and its degrees of freedom."""
+    curve, sigma = drop.curve, float(np.median(drop.track.sigma))
+    assert curve.used is not None and curve.clock is not None and curve.residual is not None
+    inside = curve.used & (curve.clock > drop.contact_time) & (curve.clock <= drop.time[-1])
+    left = curve.residual[inside & np.isfinite(curve.residual)]
+    return float(np.sum((left / sigma) ** 2)), max(left.size - DUST_PARAMETERS, 0)
+
+
 def read_observed_track(drop: Drop) -> Track:
     """The track of a drop, from its file or from its video."""
     assert drop.camera is not None and drop.record.path is not None
@@ -149,6 +178,7 @@ def observe_drops(campaign: Campaign, *, workers: int | None = 1) -> tuple[list[
                 raise explain_loss(executor, trouble, campaign.folder) or trouble from None
     if failures and not seen:
         raise failures[0][1]
+    seen = judge_noise(seen)
     lines = [f"drop {name} left out: {error}" for name, error in failures]
     lines += [
         f"drop {drop.name}: {text}"

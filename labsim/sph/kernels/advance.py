@@ -151,9 +151,16 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
                 * speed
                 / (abs(speed) + 1.0e-3)
             )
-        if outside.mass_knots.size > 0 and not led:
-            # dust that sticks to it has its speed when it does: one more body, whose push on the projectile is this
-            stuck = interpolate(depth, outside.mass_knots, outside.stuck)
+        if (outside.mass_knots.size > 0 or outside.gathered_knots.size > 0) and not led:
+            # one more body, whose push on the projectile is this. Dust that sticks has its speed when it does
+            stuck = (
+                interpolate(depth, outside.mass_knots, outside.stuck) if outside.mass_knots.size > 0 else 0.0
+            )
+            if outside.gathered_knots.size > 0:  # (m v)' = F: dust that lay still takes v² dm/dz
+                here = interpolate(depth, outside.gathered_knots, outside.gathered)
+                below = interpolate(depth + 1.0e-3 * spacing, outside.gathered_knots, outside.gathered)
+                pushed += (below - here) / (1.0e-3 * spacing) * max(-body[SPEED], 0.0) ** 2
+                stuck += here
             share = numbers.body_mass / max(numbers.body_mass + stuck, 0.1 * numbers.body_mass)
             pushed = share * (force + pushed) - force
         held = 0.0

@@ -1,0 +1,62 @@
+"""The noise of a drop's rows is judged where its depth is measured, not on its free fall."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labsim.campaign import read_campaign
+from labsim.inference.observations.observe import (
+    ObservedDrop,
+    judge_noise,
+    observe_drop,
+    read_observed_track,
+)
+
+CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")
+
+
+@pytest.fixture(scope="module")
+def plain() -> list[ObservedDrop]:
+    drops = [drop for drop in CAMPAIGN.drops if drop.record.kind == "track"][:5]
+    return [observe_drop(drop, read_observed_track(drop)) for drop in drops]
+
+
+def spoil(drop: ObservedDrop, factor: float, rng: np.random.Generator) -> ObservedDrop:
+    """The drop with what its motion leaves of the rows drawn anew: ``factor`` times the stated noise from contact on."""
+    curve = drop.curve
+    assert curve.residual is not None and curve.clock is not None
+    sigma = np.where(curve.clock > drop.contact_time, factor, 1.0) * np.median(drop.track.sigma)
+    drawn = np.where(np.isfinite(curve.residual), sigma * rng.standard_normal(sigma.size), np.nan)
+    return replace(drop, curve=replace(curve, residual=drawn))
+
+
+def compare(seen: list[ObservedDrop]) -> list[float]:
+    """Judged over stated noise."""
+    return [after.sigma / before.sigma for before, after in zip(seen, judge_noise(seen), strict=True)]
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.4])
+def test_noise_that_grows_or_falls_along_the_films_is_found(plain, factor):
+    rng = np.random.default_rng(4)
+    ratios = [ratio for _ in range(20) for ratio in compare([spoil(drop, factor, rng) for drop in plain])]
+    # the stated noise counts too, and three degrees of freedom that no motion took from these rows
+    assert np.mean(ratios) == pytest.approx(factor, rel=0.12)
+    assert np.std(ratios) < 0.12 * factor
+
+
+def test_one_noisy_film_does_not_spoil_the_others(plain):
+    rng = np.random.default_rng(5)
+    first, *others = compare([spoil(drop, 3.0 if k == 0 else 1.0, rng) for k, drop in enumerate(plain)])
+    assert first > 1.8 > 1.6 > max(others)
+
+
+def test_the_stated_noise_stands_where_no_row_says_otherwise(plain):
+    bare = [
+        replace(drop, curve=replace(drop.curve, residual=np.full_like(drop.curve.residual, np.nan)))
+        for drop in plain
+    ]
+    assert compare(bare) == pytest.approx([1.0] * len(bare))
