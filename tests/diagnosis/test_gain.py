@@ -8,12 +8,14 @@ import pytest
 from scipy.stats import kstest, multivariate_normal
 
 from labsim.diagnosis.gain import HeldOut, check_prediction, measure_gain, predict_held_out
+from labsim.effects import Normal, Parameter
 from labsim.inference.fits.blocks import Block
 from labsim.inference.observations.tracks import DropsBlock
 
 POINTS, DROPS, WIDE, SCALE = 6, 5, 100.0, 0.3
 NAMES = [f"D{k:02d}" for k in range(1, DROPS + 1)]
 EFFECT = "shear_strength"
+PARAMETER = Parameter("amplitude", "1", 0.0, (-1e3, 1e3), Normal(0.0, SCALE), 0.1, "of no reason")
 
 
 def make_fit(seed: int, *, hidden: float = 0.0):
@@ -42,7 +44,7 @@ def make_fit(seed: int, *, hidden: float = 0.0):
     ]
     fit = SimpleNamespace(drops=drops, blocks=(drops,), hypothesis=(EFFECT,), values={EFFECT: 0.0})
     problem = SimpleNamespace(
-        effects={EFFECT: SimpleNamespace(amplitudes=[SimpleNamespace(scale=SCALE)])},
+        effects={EFFECT: SimpleNamespace(amplitudes=[PARAMETER])},
         tracks=SimpleNamespace(models=models, samples={name: [name] for name in NAMES}),
     )
     return problem, fit
