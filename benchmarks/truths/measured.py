@@ -18,7 +18,7 @@ from labsim.ct.reduce import ReducedScan
 from labsim.effects import Instrument, list_places
 from labsim.inference.emulation.forward import Instant, predict_depth
 from labsim.inference.measure import Measurements
-from labsim.inference.observations.observe import Observed, observe_drop
+from labsim.inference.observations.observe import Observed, judge_noise, observe_drop
 from labsim.inference.observations.undisturbed import UndisturbedDust
 from labsim.records import STANDARD_GRAVITY, Drop, Track
 from labsim.sph.particles import initial_filling_factor
@@ -92,7 +92,7 @@ def measure_hidden(
         spread = math.hypot(blur, instrument.ct_blur)
         dust.append(UndisturbedDust(scan, depth, seen, np.full(depth.size, ROW_NOISE), spread))
     maps = [_scan(truth, hidden, template, rng, laboratory) for template in truth.templates]
-    return Measurements(drops, maps, dust)
+    return Measurements(judge_noise(drops), maps, dust)
 
 
 def _scan(

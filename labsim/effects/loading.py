@@ -11,7 +11,7 @@ import math
 import types
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from ..errors import EffectError
 from ..extensions import announce_code, list_files
@@ -30,7 +30,7 @@ from ..records import (
 )
 from ..sph.materials import list_numbers
 from .contract import KINDS, OBSERVABLES, Effect, Parameter
-from .priors import Cauchy, HalfNormal, LogNormal, Normal, Uniform
+from .priors import Prior
 
 CATALOGUE = Path(__file__).parent / "catalogue"
 _loaded: dict[tuple[Path, int], Effect] = {}
@@ -309,8 +309,9 @@ def _check_parameters(file: Path, module: types.ModuleType, campaign: Campaign) 
             refuse(
                 f"null + step = {null + step:g} lies outside the limits {low:g} to {high:g}; shorten or turn the step"
             )
-        if not isinstance(parameter.prior, (Normal, Cauchy, HalfNormal, LogNormal, Uniform)):
-            refuse(f"prior {parameter.prior!r} is not Normal, Cauchy, HalfNormal, LogNormal or Uniform")
+        if not isinstance(parameter.prior, Prior):
+            *names, last = (law.__name__ for law in get_args(Prior))
+            refuse(f"prior {parameter.prior!r} is not {', '.join(names)} or {last}")
         if not parameter.prior.sd > 0.0:
             refuse(f"prior {parameter.prior!r} needs a positive width")
         if not float(parameter.prior.cdf(high) - parameter.prior.cdf(low)) > 1e-6:

@@ -223,10 +223,9 @@ def integrate(
     low, high = (limit - found.log_p_m for limit in limits)
     sigma = math.sqrt(covariance[0, 0])
     evidence += log_share_inside(low, high, best[0], sigma)
-    # a Gaussian cut in its first coordinate: the others follow that one's mean and variance
-    with np.errstate(
-        invalid="ignore"
-    ):  # its skewness, which nobody asks for, where a limit is 10⁴ standard deviations off
+    # a Gaussian cut in its first coordinate: the others follow that one's mean and variance. Its skewness, which nobody asks for,
+    # is no number where a limit is 10⁴ standard deviations off
+    with np.errstate(invalid="ignore"):
         mean, variance = truncnorm.stats((low - best[0]) / sigma, (high - best[0]) / sigma)
     along = covariance[0] / sigma
     best = best + along * float(mean)

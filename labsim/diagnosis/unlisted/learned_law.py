@@ -117,11 +117,10 @@ def fit_formulas(
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
     them among runs about themselves."""
     simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
-    # the others cost nothing, and say how far a formula must come
-    known = [
-        _fit(problem, names, (nominal.log_p_m, {}), nominal) for names in chosen if names not in simulated
-    ]
-    sparse = [fit for fits in known for fit in fits]
+    sparse: list[Fit] = []
+    for names in chosen:
+        if names not in simulated:  # it costs nothing, and says how far a formula must come
+            sparse += _fit(problem, names, (nominal.log_p_m, {}), nominal)
     for names in simulated:  # before there are more runs, which few ones do not stand beside
         top = max([nominal.evidence, *(fit.evidence for fit in sparse)])
         with suppress(LabsimError):
@@ -183,10 +182,11 @@ def _start(problem: Problem, name: str, log_p_m: float, size: float, nominal: Fi
 def fit_siblings(problem: Problem, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
     """The other terms of the places that the best formula, and those hardly told from it, have terms at; begun where that formula
     ended and as large: which form a law has cannot be told about a p_m that is far from the truth's."""
-    ranked = sorted(fits, key=lambda fit: -fit.evidence)
+    top = max((fit.evidence for fit in fits), default=0.0)
+    near = [fit for fit in fits if fit.evidence > top - ALIKE]
     begun: dict[str, tuple[Fit, float]] = {}
-    for fit in ranked:
-        for own in fit.hypothesis if fit.evidence > ranked[0].evidence - ALIKE else ():
+    for fit in sorted(near, key=lambda fit: -fit.evidence):
+        for own in fit.hypothesis:
             begun.setdefault(list_terms()[own].place, (fit, fit.values[own] / units[own]))
     tried = {fit.hypothesis for fit in fits}
     sparse = []
@@ -194,9 +194,8 @@ def fit_siblings(problem: Problem, fits: Sequence[Fit], units: Mapping[str, floa
         term = list_terms()[name]
         if term.place in begun and (name,) not in tried:
             best, size = begun[term.place]
-            few = (
-                term.acts.over != "depth"
-            )  # what a force at one depth changes has a peak where drops end there
+            # what a force at one depth changes has a peak where drops end there, which few speeds miss
+            few = term.acts.over != "depth"
             with suppress(LabsimError):
                 begin = (best.log_p_m, {name: size * units[name]})
                 sparse.append(fit_hypothesis(problem, (name,), begin, sparse=few, nuisances=best))

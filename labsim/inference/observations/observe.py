@@ -23,8 +23,8 @@ from .observe_acceleration import ObservedImpact, observe_impact
 from .observe_push import ObservedPush, observe_push
 
 MARGIN = 4  # frames kept after the depth has stopped growing
-# Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
 DUST_PARAMETERS = 3  # that the rows in the dust tell of a motion; contact and speed are those of free fall
+# Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
 SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
 
 
