@@ -1,6 +1,6 @@
 """Diagnose a folder of labelled campaigns and compare with what was hidden in them.
 
-    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--rows ROWS.jsonl] [--workers 2]
+    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--rows ROWS.jsonl] [--workers 2] [--cells 5]
 
 FOLDER holds campaigns and ``truth.json`` (cause, p_m, note per campaign). Prints top-1, class, false alarms, wrong
 names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaign's folder only; truth is opened afterwards.
@@ -227,6 +227,7 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--rows", type=Path)
     parser.add_argument("--workers", type=int, default=None)
+    parser.add_argument("--cells", type=int, default=None)
     parser.add_argument("--store", type=Path, default=None)
     options = parser.parse_args()
     only = {name for name in options.only.split(",") if name}
@@ -244,7 +245,10 @@ def main() -> None:
             continue
         began = time.perf_counter()
         found = diagnose_campaign(
-            read_campaign(options.folder / name), RunStore(options.store), workers=options.workers
+            read_campaign(options.folder / name),
+            RunStore(options.store),
+            workers=options.workers,
+            cells=options.cells,
         )
         rows.append(describe(name, found) | {"commit": commit, "date": str(date.today())})
         top = ", ".join(f"{h} {p:.3f}" for h, p in rows[-1]["ranked"][:3])

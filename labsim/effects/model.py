@@ -17,7 +17,7 @@ Of another law than the dust's, ``law = "von_mises"`` and what is calibrated of 
 
 Under [law] stand coefficients of terms (effects/terms/), and tables at knots: ``strength_of_filling_factor`` (filling factor,
 strength over what p_m gives minus one), ``force_of_depth`` (tip radii, Pa), ``force_of_speed`` (m/s, Pa), ``mass_of_depth``
-(tip radii, share of the projectile's mass).
+and ``gathered_mass_of_depth`` (tip radii, share of the projectile's mass).
 
 ``labsim diagnose`` writes it, ``labsim simulate --model`` and ``labsim calibrate --model`` take it, people may write it.
 """

@@ -43,7 +43,7 @@ from .problem import Problem
 from .supported import refuse_others
 
 Seen = TypeVar("Seen")
-SPEED_MARGIN = 1.10  # the true speed may differ from the one on the stated scales
+SPEED_MARGIN = 1.05  # the true speed may differ from the one on the stated scales
 
 
 def open_problem(
@@ -91,9 +91,10 @@ def open_problem(
         speeds_seen = [drop.impact_speed for drop in group]
         if felt:
             nodes = own_speeds(speeds_seen)
-            sparse = sparse_positions(nodes, min(nodes), max(nodes))
         else:
-            nodes, sparse = _lay_out_speeds(speeds_seen, SPEED_MARGIN, PUSH_RATIO if pushes else SPEED_RATIO)
+            ends = min(speeds_seen) / SPEED_MARGIN, max(speeds_seen) * SPEED_MARGIN
+            nodes = speed_nodes(*ends, PUSH_RATIO if pushes else SPEED_RATIO)
+        sparse = sparse_positions(nodes)
         table = ResponseTable(np.log(nodes), sparse)
         if pushes:
             ground = measure_ground(pushes)
@@ -195,15 +196,6 @@ def extend(problem: Problem, model: Model) -> None:
 
     problem.model = model
     problem.grid.extension = apply
-
-
-def _lay_out_speeds(
-    speeds: Sequence[float], margin: float, ratio: float = SPEED_RATIO
-) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Nodes that enclose the speeds with a margin, and those of them that fingerprints are simulated at."""
-    slowest, fastest = min(speeds) / margin, max(speeds) * margin
-    nodes = speed_nodes(slowest, fastest, ratio)
-    return nodes, sparse_positions(nodes, slowest, fastest)
 
 
 def group_alike(

@@ -1,7 +1,8 @@
 """Runs on a fixed grid of impact speeds and p_m, shared by every campaign with the same projectiles and dust.
 
-Drops differ in speed by a continuum, runs need not: features of runs (curves.py) are smooth in ln v and ln p_m, so the nodes
-are fixed numbers (SPEED_RATIO, STRENGTH_RATIO apart) and a second campaign with the same projectiles finds them stored.
+Drops differ in speed by a continuum, runs need not: features of runs (curves.py) are smooth in ln v and ln p_m. Speeds are
+SPEED_RATIO apart or less, from the slowest drop to the fastest; strengths are fixed numbers, STRENGTH_RATIO apart. A second
+campaign with the same projectiles and like speeds finds its runs stored.
 """
 
 from __future__ import annotations
@@ -26,7 +27,10 @@ from ...sph.materials import find_law
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
+# between the ends of nodes, so that campaigns with like drops share runs; how many of these steps they are apart, at least
+END_RATIO, LEAST_ENDS = SPEED_RATIO**0.125, 8
 FEWEST_SPEEDS = 3
+SLACK = 0.25  # of a ratio, by which all together may be short
 # of scans and of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
@@ -101,16 +105,19 @@ class Request:
 
 
 def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
-    """Nodes of the fixed grid that enclose [slowest, fastest], at least FEWEST_SPEEDS of them; ratio : of one to the next."""
-    first = math.floor(math.log(slowest / SPEED_ANCHOR) / math.log(ratio) + 1e-9)
-    last = math.ceil(math.log(fastest / SPEED_ANCHOR) / math.log(ratio) - 1e-9)
-    while last - first + 1 < FEWEST_SPEEDS:
-        middle = math.log(math.sqrt(slowest * fastest) / SPEED_ANCHOR) / math.log(ratio)
-        if middle - first < last - middle:
-            first -= 1
-        else:
-            last += 1
-    return tuple(SPEED_ANCHOR * ratio**k for k in range(first, last + 1))
+    """Nodes (m/s) evenly apart in ln v, by about ``ratio`` or less and at least FEWEST_SPEEDS of them, the outer ones just beyond
+    [slowest, fastest].
+
+    A fast run into soft dust costs as much as all others together: none is made much faster than the fastest drop.
+    """
+    step = math.log(END_RATIO)
+    first = math.floor(math.log(slowest / SPEED_ANCHOR) / step + 1e-9)
+    last = math.ceil(math.log(fastest / SPEED_ANCHOR) / step - 1e-9)
+    while last - first < LEAST_ENDS:
+        first, last = first - 1, last + 1
+    count = max(math.ceil((last - first) * step / math.log(ratio) - SLACK) + 1, FEWEST_SPEEDS)
+    nodes = SPEED_ANCHOR * END_RATIO ** np.linspace(first, last, count)
+    return tuple(float(f"{node:.4g}") for node in nodes)
 
 
 def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
@@ -129,12 +136,10 @@ def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(f"{node:.3g}") for node in nodes)
 
 
-def sparse_positions(speeds: Sequence[float], slowest: float, fastest: float) -> tuple[int, ...]:
-    """Two neighbouring nodes where they enclose all speeds, else both ends and the middle."""
-    below = max(int(np.searchsorted(speeds, slowest * (1 + 1e-9))) - 1, 0)
-    above = min(int(np.searchsorted(speeds, fastest * (1 - 1e-9))), len(speeds) - 1)
-    if above - below <= 1:
-        return (below, below + 1) if below + 1 < len(speeds) else (below - 1, below)
+def sparse_positions(speeds: Sequence[float]) -> tuple[int, ...]:
+    """Both ends and the middle; the ends alone where they are near each other."""
+    if speeds[-1] < SPEED_RATIO**1.01 * speeds[0]:
+        return 0, len(speeds) - 1
     return tuple(sorted({0, (len(speeds) - 1) // 2 + (len(speeds) % 2 == 0), len(speeds) - 1}))
 
 
