@@ -55,14 +55,14 @@ def test_the_share_far_outside_is_the_tail():
     assert log_share_inside(-600.0, -300.0, 0.0, 10.0) == pytest.approx(norm.logcdf(-30.0))
 
 
-@pytest.mark.parametrize(("slowest", "fastest"), [(0.14, 1.18), (0.3, 0.31), (0.1, 0.9), (0.2, 0.2)])
+@pytest.mark.parametrize(("slowest", "fastest"), [(0.145, 1.18), (0.3, 0.31), (0.11, 0.9), (0.2, 0.2)])
 def test_speed_nodes_enclose_and_are_shared(slowest, fastest):
     nodes = np.array(speed_nodes(slowest, fastest))
     assert nodes[0] <= slowest and nodes[-1] >= fastest
     # the outer ones just beyond, or as near as three nodes that still tell a slope
-    assert nodes[-1] / nodes[0] < max(1.14 * 1.001 * fastest / slowest, 1.83)
+    assert nodes[-1] / nodes[0] < max(1.145 * 1.001 * fastest / slowest, 1.85)
     assert len(nodes) >= 3 and np.ptp(np.diff(np.log(nodes))) < 2e-3  # evenly apart
-    assert 1.29 < nodes[1] / nodes[0] < 1.85
+    assert 1.29 < nodes[1] / nodes[0] < 1.6
     assert tuple(nodes) == speed_nodes(1.002 * slowest, 0.998 * fastest)  # of another campaign
     assert strength_node(1) == 2000.0
     assert strength_node(1) == 2000.0

@@ -24,17 +24,17 @@ from ...runs.store import Progress, RunStore
 from ...sph import DropSetting
 from ...sph.materials import find_law
 
-SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.7  # m/s
+SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.55  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
 # between the ends of nodes, so that campaigns with like drops share runs; how many of these steps they are apart, at least
-END_RATIO, LEAST_ENDS = SPEED_RATIO**0.125, 8
+END_RATIO, LEAST_ENDS = 1.07, 8
 FEWEST_SPEEDS = 3
 SLACK = 0.25  # of a ratio, by which all together may be short
 # of scans and of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
-SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, math.sqrt(SPEED_RATIO)
+SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, 1.3
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 # of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more
 # than the usual, in proportion
@@ -138,7 +138,7 @@ def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
 
 def sparse_positions(speeds: Sequence[float]) -> tuple[int, ...]:
     """Both ends and the middle; the ends alone where they are near each other."""
-    if speeds[-1] < SPEED_RATIO**1.01 * speeds[0]:
+    if speeds[-1] < END_RATIO ** (LEAST_ENDS + 1.5) * speeds[0]:
         return 0, len(speeds) - 1
     return tuple(sorted({0, (len(speeds) - 1) // 2 + (len(speeds) % 2 == 0), len(speeds) - 1}))
 
