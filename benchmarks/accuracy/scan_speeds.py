@@ -24,19 +24,21 @@ from labsim.inference.emulation.grid import (
     SCAN_CELLS,
     interpolation_weights,
     set_nominal_drop,
-    speed_nodes,
 )
 from labsim.inference.measure import measure
 from labsim.inference.observations.compacted_zone import ObservedScan, extract_map, observe_scan
 
 P_M, FINE = 1000.0, 2 * SCAN_CELLS
+RATIO = 1.7  # of the speeds that a map is interpolated between
 CHANGES = {"": 0.0, "shear_strength": -0.4, "tensile_strength": -0.6}  # amplitudes
 Code = Callable[[float, int], np.ndarray]
 
 
 def interpolate_on_grid(code: Code, speed: float) -> np.ndarray:
-    """Through the nodes of the grid of speeds about one."""
-    nodes = speed_nodes(speed, speed)
+    """Through three speeds of a grid that enclose one."""
+    below = round(math.log(speed / 0.1) / math.log(RATIO) - 0.5)
+    first = below - (math.log(speed / 0.1) / math.log(RATIO) - below < 0.5)
+    nodes = [0.1 * RATIO ** (first + k) for k in range(3)]
     weights = interpolation_weights(tuple(np.log(nodes)), math.log(speed))
     return np.sum([w * code(node, SCAN_CELLS) for w, node in zip(weights, nodes, strict=True)], axis=0)
 

@@ -94,7 +94,7 @@ def open_problem(
         else:
             ends = min(speeds_seen) / SPEED_MARGIN, max(speeds_seen) * SPEED_MARGIN
             nodes = speed_nodes(*ends, PUSH_RATIO if pushes else SPEED_RATIO)
-        sparse = sparse_positions(nodes)
+        sparse = sparse_positions(nodes, felt)
         table = ResponseTable(np.log(nodes), sparse)
         if pushes:
             ground = measure_ground(pushes)

@@ -65,7 +65,6 @@ def test_speed_nodes_enclose_and_are_shared(slowest, fastest):
     assert 1.29 < nodes[1] / nodes[0] < 1.6
     assert tuple(nodes) == speed_nodes(1.002 * slowest, 0.998 * fastest)  # of another campaign
     assert strength_node(1) == 2000.0
-    assert strength_node(1) == 2000.0
 
 
 def test_a_run_comes_back_from_its_features():

@@ -1,8 +1,7 @@
-"""Runs on a fixed grid of impact speeds and p_m, shared by every campaign with the same projectiles and dust.
+"""Runs on a grid of impact speeds and p_m, shared by campaigns with the same projectiles and dust and like speeds.
 
 Drops differ in speed by a continuum, runs need not: features of runs (curves.py) are smooth in ln v and ln p_m. Speeds are
-SPEED_RATIO apart or less, from the slowest drop to the fastest; strengths are fixed numbers, STRENGTH_RATIO apart. A second
-campaign with the same projectiles and like speeds finds its runs stored.
+about SPEED_RATIO apart or less, from the slowest drop to the fastest; strengths are fixed numbers, STRENGTH_RATIO apart.
 """
 
 from __future__ import annotations
@@ -27,10 +26,11 @@ from ...sph.materials import find_law
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.55  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
 PUSH_RATIO = 4.0  # of a push speed enters by rates alone, and strengths go with their logarithms
-# between the ends of nodes, so that campaigns with like drops share runs; how many of these steps they are apart, at least
-END_RATIO, LEAST_ENDS = 1.07, 8
+# the outer nodes lie on a ladder with this ratio, so that campaigns with like drops share runs, at least so many rungs apart, or
+# the roughness of runs would be taken for what speed changes
+END_RATIO, LEAST_RUNGS = 1.07, 8
 FEWEST_SPEEDS = 3
-SLACK = 0.25  # of a ratio, by which all together may be short
+SLACK = 0.25  # of one ratio, which all together may be longer: a node more for less is not worth its runs
 # of scans and of drops with an accelerometer, which are simulated at their own speeds: through nodes 1.7 apart the stopping time
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
@@ -113,7 +113,7 @@ def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> t
     step = math.log(END_RATIO)
     first = math.floor(math.log(slowest / SPEED_ANCHOR) / step + 1e-9)
     last = math.ceil(math.log(fastest / SPEED_ANCHOR) / step - 1e-9)
-    while last - first < LEAST_ENDS:
+    while last - first < LEAST_RUNGS:
         first, last = first - 1, last + 1
     count = max(math.ceil((last - first) * step / math.log(ratio) - SLACK) + 1, FEWEST_SPEEDS)
     nodes = SPEED_ANCHOR * END_RATIO ** np.linspace(first, last, count)
@@ -136,9 +136,10 @@ def own_speeds(speeds: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(f"{node:.3g}") for node in nodes)
 
 
-def sparse_positions(speeds: Sequence[float]) -> tuple[int, ...]:
-    """Both ends and the middle; the ends alone where they are near each other."""
-    if speeds[-1] < END_RATIO ** (LEAST_ENDS + 1.5) * speeds[0]:
+def sparse_positions(speeds: Sequence[float], felt: bool) -> tuple[int, ...]:
+    """Both ends and the middle; of filmed drops with like speeds the ends alone. felt : an accelerometer is on some of them."""
+    rungs = math.log(speeds[-1] / speeds[0]) / math.log(END_RATIO)
+    if not felt and round(rungs) <= LEAST_RUNGS + 1:  # speed_nodes widens by two rungs at a time
         return 0, len(speeds) - 1
     return tuple(sorted({0, (len(speeds) - 1) // 2 + (len(speeds) % 2 == 0), len(speeds) - 1}))
 
