@@ -33,6 +33,7 @@ FORMAT = 1  # of the stored files; part of the key
 HEAD = 512  # bytes before the HDF5 part, the smallest user block there is
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LARGEST = 1 << 30  # bytes of one array; a damaged file may claim any size
+PACKED = 1 << 16  # bytes, from which on an array is compressed: smaller ones would take more room and four times as long
 # whatever a file that was cut, flipped or swapped can make of its readers
 DAMAGE = (
     OSError,
@@ -87,8 +88,11 @@ def canonical(setting: DropSetting) -> str:
 
 def make_key(setting: DropSetting, solver: str | None = None) -> str:
     """sha256 over the file format, the solver's sources and the setting."""
-    text = json.dumps([FORMAT, solver or solver_hash(setting.material.law), canonical(setting)])
-    return hashlib.sha256(text.encode()).hexdigest()
+    return _hash(solver or solver_hash(setting.material.law), canonical(setting))
+
+
+def _hash(solver: str, setting: str) -> str:
+    return hashlib.sha256(json.dumps([FORMAT, solver, setting]).encode()).hexdigest()
 
 
 def _exact(value: Any) -> Any:
@@ -108,13 +112,14 @@ def _exact(value: Any) -> Any:
 def write_run_file(path: Path, run: DropRun | FailedRun, wall: float = 0.0) -> Path:
     """A run with its setting as one HDF5 file: arrays as datasets, the rest as attributes (JSON)."""
     setting = run.setting
+    solver, text = solver_hash(setting.material.law), canonical(setting)
     whole = io.BytesIO()  # HDF5 does not end well on a full disk; plain bytes do
     with h5py.File(whole, "w", userblock_size=HEAD) as stored:
         stored.attrs.update(
             format=FORMAT,
-            key=make_key(setting),
-            solver=solver_hash(setting.material.law),
-            setting_key=canonical(setting),
+            key=_hash(solver, text),
+            solver=solver,
+            setting_key=text,
             setting=json.dumps(dataclasses.asdict(setting)),
             status="failed" if isinstance(run, FailedRun) else "done",
             created=time.time(),
@@ -201,8 +206,7 @@ def read_label(path: Path) -> Stored:
 def check_run_file(path: Path) -> None:
     """Read a file whole; raises one of DAMAGE where it is not the run that its name says."""
     with _open(path) as stored:
-        text = json.dumps([FORMAT, stored.attrs["solver"], stored.attrs["setting_key"]])
-        if hashlib.sha256(text.encode()).hexdigest() != path.stem or stored.attrs["key"] != path.stem:
+        if _hash(stored.attrs["solver"], stored.attrs["setting_key"]) != path.stem or stored.attrs["key"] != path.stem:
             raise ValueError("its name is not the hash of its setting")
         stored.visititems(
             lambda name, item: _values(item.id).size if isinstance(item, h5py.Dataset) else None
@@ -224,8 +228,8 @@ def _pack(group: h5py.Group, record: Any, skip: set[str] = frozenset()) -> None:
             continue
         value = getattr(record, field.name)
         if isinstance(value, np.ndarray):
-            options = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
-            group.create_dataset(field.name, data=value, **(options if value.ndim and value.size else {}))
+            options = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+            group.create_dataset(field.name, data=value, **(options if value.nbytes > PACKED else {}))
         elif dataclasses.is_dataclass(value):
             _pack(group.create_group(field.name), value)
         else:

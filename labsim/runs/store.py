@@ -165,7 +165,7 @@ class RunStore:
 
     def _run_missing(
         self, executor: Executor, slots: int, todo: list[tuple[str, DropSetting]]
-    ) -> Iterator[tuple[str, DropRun | FailedRun]]:
+    ) -> Iterator[tuple[str, AnyPart | FailedRun]]:
         running: dict[Future, tuple[str, DropSetting, filelock.FileLock]] = {}
         elsewhere: list[tuple[str, DropSetting]] = []
         try:
@@ -180,7 +180,7 @@ class RunStore:
                         continue
                     except OSError as trouble:
                         raise self._refused(trouble) from None
-                    if (stored := self.find(setting)) is not None:  # finished elsewhere since we looked
+                    if (stored := self._read(key, setting)) is not None:  # finished elsewhere since we looked
                         lock.release()
                         self.reused += 1
                         yield key, stored

@@ -34,6 +34,9 @@ MOST_SIMULATED = (
     4  # of them, those that get as far as the best by ROUGH: ln evidence, which few runs give to some twenty
 )
 ROUGH = 60.0
+# other forms of a place, those that are weighed first: of sixteen forms of a force of depth the five best after runs of their own
+# were among these (p12)
+MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of the places of the best and of those hardly told from it, likewise
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
@@ -88,8 +91,10 @@ def learn_law(problem: Problem, nominal: Fit, tangents: Tangents, before: HeldOu
     free, terms, units = add_terms(problem, tangents.laws)
     free = replace(free, shape_evidence={**free.shape_evidence, **share_places(terms)})
     low, high = (math.log(p) for p in problem.campaign.p_m_range)
-    chosen = choose_formulas(weigh_formulas(tangents, terms, units, (low, high)), terms)
-    fits = fit_formulas(free, nominal, [names for names, _ in chosen], units)
+    weighed = weigh_formulas(tangents, terms, units, (low, high))
+    chosen = [names for names, _ in choose_formulas(weighed, terms)]
+    ranked = dict.fromkeys([names[0] for names, _ in weighed if len(names) == 1] + list(terms))
+    fits = fit_formulas(free, nominal, chosen, {name: units[name] for name in ranked})
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -115,7 +120,7 @@ def fit_formulas(
     units: Mapping[str, float],
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
-    them among runs about themselves."""
+    them among runs about themselves. units : of all terms, those first that are weighed first."""
     simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
     sparse: list[Fit] = []
     for names in chosen:
@@ -181,18 +186,21 @@ def _start(problem: Problem, name: str, log_p_m: float, size: float, nominal: Fi
 
 def fit_siblings(problem: Problem, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
     """The other terms of the places that the best formula, and those hardly told from it, have terms at; begun where that formula
-    ended and as large: which form a law has cannot be told about a p_m that is far from the truth's."""
+    ended and as large: which form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as
+    ``units`` has them in order."""
     top = max((fit.evidence for fit in fits), default=0.0)
     near = [fit for fit in fits if fit.evidence > top - ALIKE]
     begun: dict[str, tuple[Fit, float]] = {}
     for fit in sorted(near, key=lambda fit: -fit.evidence):
         for own in fit.hypothesis:
             begun.setdefault(list_terms()[own].place, (fit, fit.values[own] / units[own]))
-    tried = {fit.hypothesis for fit in fits}
+    known = {fit.hypothesis for fit in fits}
     sparse = []
+    tried = Counter[str]()
     for name in units:
         term = list_terms()[name]
-        if term.place in begun and (name,) not in tried:
+        if term.place in begun and (name,) not in known and tried[term.place] < MOST_TRIED:
+            tried[term.place] += 1
             best, size = begun[term.place]
             # what a force at one depth changes has a peak where drops end there, which few speeds miss
             few = term.acts.over != "depth"
