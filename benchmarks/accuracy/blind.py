@@ -1,6 +1,6 @@
 """Diagnose a folder of labelled campaigns and compare with what was hidden in them.
 
-    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--rows ROWS.jsonl] [--workers 2] [--cells 4]
+    python -m benchmarks.accuracy.blind FOLDER [--only p03,p05] [--rows ROWS.jsonl] [--workers 2] [--cells 5]
 
 FOLDER holds campaigns and ``truth.json`` (cause, p_m, note per campaign). Prints top-1, class, false alarms, wrong
 names, Brier score, coverage of p_m, gain, time. The diagnosis reads the campaign's folder only; truth is opened afterwards.

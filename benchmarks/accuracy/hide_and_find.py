@@ -3,7 +3,7 @@
     OMP_NUM_THREADS=1 python -m benchmarks.accuracy.hide_and_find [--seed 20261121] [--workers 2] [--store FOLDER]
 
 The campaigns are seven drops of two rods and the undisturbed dust of two scans, made by labsim's own solver at a/dx = 6 with
-noise, scatter and nuisances (benchmarks.truths.measured) and judged at 4: one holds nothing, one each an effect of the
+noise, scatter and nuisances (benchmarks.truths.measured) and judged at 5: one holds nothing, one each an effect of the
 material, the sample, the contact and the measurement, one an effect that costs runs and one of the measurement together, one a
 cause in no catalogue. Everything is drawn from the seed: today's date unless --seed repeats another. Strengths are 12 to 20
 standard deviations of what the best nominal fit leaves in a campaign without noise (benchmarks.truths.strength), of each

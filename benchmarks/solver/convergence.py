@@ -28,7 +28,7 @@ from labsim.sph.convergence import COMPACTED, extrapolate
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "convergence.png"
 RADIUS_MM = 0.5
 CELLS = [4.0, 5.0, 6.0, 8.0, 12.0, 16.0]
-WORKING = {"fits": 4.0, "single drops": 8.0}  # spacings in a tip radius that labsim uses
+WORKING = {"fits": 5.0, "single drops": 8.0}  # spacings in a tip radius that labsim uses
 SPEEDS = (0.14, 0.20, 0.30, 0.65, 1.00, 1.18)  # m/s; compacted volumes are there for three of them
 FIRM = {"D": 1.0, "T_s": 1.5, "V": 8.0}  # %, of the independent solver's limits
 COLUMNS = {"D": "depth_mm", "T_s": "stopping_time_ms", "V": "volume20"}

@@ -35,9 +35,10 @@ SLACK = 0.25  # of one ratio, which all together may be longer: a node more for 
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, 1.3
-# spacings in a tip radius; docs/other-methods.md: 0.42 % of the depth left at that. Fingerprints have no more: what an effect
-# changes needs less than what it is added to (docs/discretisation.md)
-DEFAULT_CELLS = 4
+DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
+# of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more
+# than the usual, in proportion
+COARSE_CELLS = 4
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
@@ -264,7 +265,7 @@ class RunGrid:
         if group.felt:
             usual = max(self.cells, FELT_CELLS)
         elif sparse:
-            usual = min(self.cells, DEFAULT_CELLS)
+            usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
         of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
         setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own)
