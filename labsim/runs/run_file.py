@@ -33,7 +33,9 @@ FORMAT = 1  # of the stored files; part of the key
 HEAD = 512  # bytes before the HDF5 part, the smallest user block there is
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LARGEST = 1 << 30  # bytes of one array; a damaged file may claim any size
-PACKED = 1 << 16  # bytes, from which on an array is compressed: smaller ones would take more room and four times as long
+PACKED = (
+    1 << 16
+)  # bytes, from which on an array is compressed: smaller ones would take more room and four times as long
 # whatever a file that was cut, flipped or swapped can make of its readers
 DAMAGE = (
     OSError,
@@ -206,7 +208,10 @@ def read_label(path: Path) -> Stored:
 def check_run_file(path: Path) -> None:
     """Read a file whole; raises one of DAMAGE where it is not the run that its name says."""
     with _open(path) as stored:
-        if _hash(stored.attrs["solver"], stored.attrs["setting_key"]) != path.stem or stored.attrs["key"] != path.stem:
+        if (
+            _hash(stored.attrs["solver"], stored.attrs["setting_key"]) != path.stem
+            or stored.attrs["key"] != path.stem
+        ):
             raise ValueError("its name is not the hash of its setting")
         stored.visititems(
             lambda name, item: _values(item.id).size if isinstance(item, h5py.Dataset) else None

@@ -75,7 +75,7 @@ def test_exchange_keeps_volume_and_leaves_elastic_dust_alone():
     [(0.65, 0.689e-3, 1.762e-3, 0.76, 0.06), (0.20, 0.217e-3, 1.628e-3, 0.104, 0.35)],
 )
 def test_a_bead_against_two_other_methods(speed, depth, stop, above_20, tolerance, cells):
-    """Depth and stopping time of a material-point solver's limits, volumes of a Lagrangian mesh; a/dx of fingerprints and fits."""
+    """Depth and stopping time of a material-point solver's limits, volumes of a mesh; a/dx of fingerprints and of fits."""
     run = simulate(DropSetting(BEAD, speed, Material(), spacing=RADIUS / cells))
     volume = {phi: run.compacted_volume(phi) / BEAD_VOLUME for phi in (0.17, 0.20, 0.22)}
     print(f"D {run.penetration_depth / depth - 1:+.2%} T_s {run.stopping_time / stop - 1:+.2%} V {volume} "

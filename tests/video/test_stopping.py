@@ -167,7 +167,9 @@ def test_cost_grows_linearly() -> None:
         z = evaluate_motion(np.arange(n) / rate - 6e-3, 0.8, 2e-3, 9.81, 0.4)
         rows = 300 + z / PIXEL + rng.normal(0, 0.02, n)
         where = rng.choice(n, n // 20, replace=False)
-        rows[where] += rng.choice([-1, 1], len(where)) * np.exp(rng.uniform(np.log(0.3), np.log(30), len(where)))
+        rows[where] += rng.choice([-1, 1], len(where)) * np.exp(
+            rng.uniform(np.log(0.3), np.log(30), len(where))
+        )
         track = make_track(rows, 0.02, rate=rate)
         begun = time.process_time()
         curve = fit_deceleration(track, Camera(rate, PIXEL, 300.0, 0.0))
