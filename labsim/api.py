@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # pragma: no cover
     from .ct import ReducedScan
     from .diagnosis.campaign import Diagnosis
     from .diagnosis.published.campaign import SummaryDiagnosis
+    from .effects.model import Model
     from .inference.calibrate import Calibration
     from .inference.fits.posterior import Posterior
     from .inference.published.calibrate import SummaryCalibration
@@ -122,7 +123,10 @@ def reduce_scan(
     solid_density: float | None = None,
     bead_radius: float | None = None,
     bead_mass: float | None = None,
-    **settings: Any,
+    cell: int | None = None,
+    guard: float | None = None,
+    correct: bool = True,
+    progress: StudyProgress | None = None,
 ) -> ReducedScan:
     """Slices to the axisymmetric map of the filling factor; its ``map`` is a FillingMap.
 
@@ -137,8 +141,14 @@ def reduce_scan(
         "top" or "bottom".
     grey_air, grey_per_density, solid_density : float, optional
         Grey level of air, grey levels per kg/m³, density of the grains' own material in kg/m³.
-    settings
-        As ``labsim.ct.reduce_scan`` takes them (cell, guard …).
+    cell : int, optional
+        Voxels along an edge of a cell.
+    guard : float, optional
+        Voxels about the bead that are left out, at least.
+    correct : bool
+        Whether cupping and rings are taken out where they are significant.
+    progress : callable, optional
+        Takes work done, all work and what is done, now and then.
 
     Returns
     -------
@@ -152,6 +162,7 @@ def reduce_scan(
     from . import ct
     from .campaign import read_scan
     from .campaign_scans import NEEDED, complete_stack
+    from .ct.reduce import CELL, GUARD
 
     # key of scan.toml -> what was given, as the key has it, and what it is called here
     keys = {
@@ -180,7 +191,13 @@ def reduce_scan(
             raise CampaignError(
                 source, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
             )
-        return ct.reduce_scan(slices, **settings)
+        return ct.reduce_scan(
+            slices,
+            cell=CELL if cell is None else cell,
+            guard=GUARD if guard is None else guard,
+            correct=correct,
+            progress=progress,
+        )
 
 
 @overload
@@ -249,7 +266,14 @@ def calibrate(
     parameters: Sequence[str] = ("p_m",),
     *,
     store: Path | str | None = None,
-    **settings: Any,
+    model: Model | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 1,
+    progress: StudyProgress | None = None,
+    use_scans: bool = True,
+    use: Sequence[str] = ("depth",),
+    bulk_modulus: float | None = None,
 ) -> Calibration | SummaryCalibration:
     """The posterior of p_m (Pa), and of effects named in ``parameters``.
 
@@ -261,9 +285,22 @@ def calibrate(
         "p_m", and effects as "shear_strength" or "shear_strength.factor".
     store : Path or str, optional
         Folder of the stored runs. Default: LABSIM_STORE, or the user's cache.
-    settings
-        workers, scheduler, seed, progress, and what ``labsim.inference.calibrate.calibrate`` takes for tracks and
-        ``labsim.inference.published.calibrate.calibrate_summary`` for published figures.
+    model : Model, optional
+        Effects and material that are held fixed, as read from a model.toml; for tracks.
+    workers : int, optional
+        Processes; one a core where it is not given.
+    scheduler : str, optional
+        Address of a Dask scheduler.
+    seed : int
+        Of everything that is drawn.
+    progress : callable, optional
+        Takes work done, all work and what is done, now and then.
+    use_scans : bool
+        Whether CT maps are compared; for tracks.
+    use : sequence of str
+        Which figures are compared, "depth" and "stopping_time"; for published figures.
+    bulk_modulus : float, optional
+        Pa; for published figures. Default: that of the campaign.
 
     Returns
     -------
@@ -280,10 +317,29 @@ def calibrate(
         if read.has_records:
             from .inference.calibrate import calibrate as calibrate_tracks
 
-            return calibrate_tracks(read, parameters, store=_open(store), **settings)
+            return calibrate_tracks(
+                read,
+                parameters,
+                store=_open(store),
+                model=model,
+                workers=workers,
+                scheduler=scheduler,
+                seed=seed,
+                progress=progress,
+                use_scans=use_scans,
+            )
         from .inference.published.calibrate import calibrate_summary
 
-        return calibrate_summary(read, _open(store), **settings)
+        return calibrate_summary(
+            read,
+            _open(store),
+            use=use,
+            bulk_modulus=bulk_modulus,
+            workers=workers,
+            scheduler=scheduler,
+            seed=seed,
+            progress=progress,
+        )
 
 
 def diagnose(
