@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from itertools import pairwise
 
 import pytest
@@ -37,3 +38,12 @@ def test_every_parameter_is_explained(name: str) -> None:
     words = text.split("Parameters\n----------\n")[1].split("\n\n")[0]
     for parameter in inspect.signature(thing).parameters:
         assert parameter in words, parameter
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_public_name_takes_or_gives_just_anything(name: str) -> None:
+    signature = inspect.signature(getattr(labsim, name))
+    annotations = [parameter.annotation for parameter in signature.parameters.values()]
+    assert not [
+        each for each in [*annotations, signature.return_annotation] if re.search(r"\bAny\b", str(each))
+    ]
