@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,32 @@ if TYPE_CHECKING:  # pragma: no cover
     from .runs.store import RunStore
     from .sph import DropRun, DropSetting
     from .video.projectile.following import Progress
+
+
+class ScanSettings(TypedDict, total=False):
+    """What ``labsim.ct.reduce_scan`` takes besides the scan."""
+
+    cell: int
+    guard: float
+    sample_filling_factor: float | None
+    correct: bool
+    progress: StudyProgress | None
+
+
+class CalibrationSettings(TypedDict, total=False):
+    """What calibration takes besides parameters and store: four for all, three for tracks, four for published figures."""
+
+    workers: int | None
+    scheduler: str | None
+    seed: int
+    progress: StudyProgress | None
+    model: Model | None
+    backend: Path | None
+    use_scans: bool
+    use: Sequence[str]
+    depth_reading: str | None
+    bulk_modulus: float | None
+    other_readings: bool
 
 
 def track(
@@ -123,10 +149,7 @@ def reduce_scan(
     solid_density: float | None = None,
     bead_radius: float | None = None,
     bead_mass: float | None = None,
-    cell: int | None = None,
-    guard: float | None = None,
-    correct: bool = True,
-    progress: StudyProgress | None = None,
+    **settings: Unpack[ScanSettings],
 ) -> ReducedScan:
     """Slices to the axisymmetric map of the filling factor; its ``map`` is a FillingMap.
 
@@ -141,14 +164,8 @@ def reduce_scan(
         "top" or "bottom".
     grey_air, grey_per_density, solid_density : float, optional
         Grey level of air, grey levels per kg/m³, density of the grains' own material in kg/m³.
-    cell : int, optional
-        Voxels along an edge of a cell.
-    guard : float, optional
-        Voxels about the bead that are left out, at least.
-    correct : bool
-        Whether cupping and rings are taken out where they are significant.
-    progress : callable, optional
-        Takes work done, all work and what is done, now and then.
+    settings
+        As ``labsim.ct.reduce_scan`` takes them (cell, guard …).
 
     Returns
     -------
@@ -162,7 +179,6 @@ def reduce_scan(
     from . import ct
     from .campaign import read_scan
     from .campaign_scans import NEEDED, complete_stack
-    from .ct.reduce import CELL, GUARD
 
     # key of scan.toml -> what was given, as the key has it, and what it is called here
     keys = {
@@ -191,13 +207,7 @@ def reduce_scan(
             raise CampaignError(
                 source, "scan.slices", "gives published figures, not slices; there is nothing to reduce"
             )
-        return ct.reduce_scan(
-            slices,
-            cell=CELL if cell is None else cell,
-            guard=GUARD if guard is None else guard,
-            correct=correct,
-            progress=progress,
-        )
+        return ct.reduce_scan(slices, **settings)
 
 
 @overload
@@ -266,14 +276,7 @@ def calibrate(
     parameters: Sequence[str] = ("p_m",),
     *,
     store: Path | str | None = None,
-    model: Model | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    seed: int = 1,
-    progress: StudyProgress | None = None,
-    use_scans: bool = True,
-    use: Sequence[str] = ("depth",),
-    bulk_modulus: float | None = None,
+    **settings: Unpack[CalibrationSettings],
 ) -> Calibration | SummaryCalibration:
     """The posterior of p_m (Pa), and of effects named in ``parameters``.
 
@@ -285,22 +288,9 @@ def calibrate(
         "p_m", and effects as "shear_strength" or "shear_strength.factor".
     store : Path or str, optional
         Folder of the stored runs. Default: LABSIM_STORE, or the user's cache.
-    model : Model, optional
-        Effects and material that are held fixed, as read from a model.toml; for tracks.
-    workers : int, optional
-        Processes; one a core where it is not given.
-    scheduler : str, optional
-        Address of a Dask scheduler.
-    seed : int
-        Of everything that is drawn.
-    progress : callable, optional
-        Takes work done, all work and what is done, now and then.
-    use_scans : bool
-        Whether CT maps are compared; for tracks.
-    use : sequence of str
-        Which figures are compared, "depth" and "stopping_time"; for published figures.
-    bulk_modulus : float, optional
-        Pa; for published figures. Default: that of the campaign.
+    settings
+        workers, scheduler, seed, progress, and what ``labsim.inference.calibrate.calibrate`` takes for tracks and
+        ``labsim.inference.published.calibrate.calibrate_summary`` for published figures.
 
     Returns
     -------
@@ -313,33 +303,15 @@ def calibrate(
         For an unknown parameter, and where measuring or simulating fails.
     """
     read = _read(campaign)
+    # either refuses the settings that are the other's
     with _one_thread():
         if read.has_records:
             from .inference.calibrate import calibrate as calibrate_tracks
 
-            return calibrate_tracks(
-                read,
-                parameters,
-                store=_open(store),
-                model=model,
-                workers=workers,
-                scheduler=scheduler,
-                seed=seed,
-                progress=progress,
-                use_scans=use_scans,
-            )
+            return calibrate_tracks(read, parameters, store=_open(store), **settings)  # type: ignore[misc]
         from .inference.published.calibrate import calibrate_summary
 
-        return calibrate_summary(
-            read,
-            _open(store),
-            use=use,
-            bulk_modulus=bulk_modulus,
-            workers=workers,
-            scheduler=scheduler,
-            seed=seed,
-            progress=progress,
-        )
+        return calibrate_summary(read, _open(store), **settings)  # type: ignore[misc]
 
 
 def diagnose(

@@ -33,9 +33,7 @@ FORMAT = 1  # of the stored files; part of the key
 HEAD = 512  # bytes before the HDF5 part, the smallest user block there is
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LARGEST = 1 << 30  # bytes of one array; a damaged file may claim any size
-PACKED = (
-    1 << 16
-)  # bytes, from which on an array is compressed: smaller ones would take more room and four times as long
+PACKED = 1 << 16  # bytes; arrays that are larger are compressed, smaller ones would take more room
 # whatever a file that was cut, flipped or swapped can make of its readers
 DAMAGE = (
     OSError,

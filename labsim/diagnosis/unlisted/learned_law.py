@@ -34,7 +34,7 @@ MOST_SIMULATED = (
     4  # of them, those that get as far as the best by ROUGH: ln evidence, which few runs give to some twenty
 )
 ROUGH = 60.0
-# other forms of a place, those that are weighed first: of sixteen forms of a force of depth the five best after runs of their own
+# other forms of a place, those that are weighed first: of fifteen forms of a force of depth the four best after runs of their own
 # were among these (p12)
 MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of the places of the best and of those hardly told from it, likewise
