@@ -15,7 +15,8 @@ import functools
 import importlib
 import logging
 import pkgutil
-from importlib.metadata import EntryPoint, entry_points
+import sys
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -71,11 +72,17 @@ def list_files(group: str, known: dict[str, Path]) -> dict[str, Path]:
 
 
 def _list_entries(group: str, known: dict[str, ModuleType] | dict[str, Path]) -> list[EntryPoint]:
-    entries = sorted(entry_points(group=group), key=lambda entry: entry.name)
+    entries = sorted(_read_entries(group, tuple(sys.path)), key=lambda entry: entry.name)
     for entry in entries:
         if entry.name in known:
             raise _refuse(entry, group, "has the name of one that comes with labsim")
     return entries
+
+
+@functools.cache
+def _read_entries(group: str, path: tuple[str, ...]) -> EntryPoints:
+    """Those that are installed on ``path`` (sys.path), looked for once a process: it takes tens of ms."""
+    return entry_points(group=group)
 
 
 def _refuse(entry: EntryPoint, group: str, what: str) -> LabsimError:

@@ -175,7 +175,7 @@ def make_campaigns(
     chosen = [h for h in planned if not asked or h["name"] in asked]
     arguments.out.mkdir(parents=True, exist_ok=True)
     truth_file = arguments.out / "truth.json"
-    truth = json.loads(truth_file.read_text()) if truth_file.exists() else {}
+    truth = _read_truth(truth_file)
     for h in chosen:
         if h["name"] in truth:
             truth[h["name"]].update(name_hidden(h))
@@ -184,13 +184,18 @@ def make_campaigns(
     with ProcessPoolExecutor(arguments.workers, mp_context=get_context("spawn")) as pool:
         for future in [pool.submit(make, job) for job in jobs]:
             name, found = future.result()
-            truth[name] = found
-            partly = truth_file.with_suffix(".part")
+            # others may have made theirs since
+            truth = {**_read_truth(truth_file), **truth, name: found}
+            partly = truth_file.with_suffix(f".{os.getpid()}.part")
             partly.write_text(json.dumps(truth, indent=1))
             os.replace(partly, truth_file)
             print(
                 f"{name}: {found['cause']} ({found['note']}), {time.perf_counter() - began:.0f} s", flush=True
             )
+
+
+def _read_truth(file: Path) -> dict:
+    return json.loads(file.read_text()) if file.exists() else {}
 
 
 def measure_campaigns(

@@ -11,6 +11,8 @@ from benchmarks.lagrangian_mesh import quadrilateral
 BEAD_DENSITY = 2540.0  # kg/m^3
 BEAD = BEAD_DENSITY * 4.0 / 3.0 * np.pi  # kg/m^3: mass of a glass bead over the cube of its radius
 
+LOOSEST = 0.005  # of φ over φ1, that a gradient leaves
+
 
 @dataclass(frozen=True)
 class Dust:
@@ -48,9 +50,12 @@ class Dust:
         )  # fmt: skip
 
     def fill(self, depth: np.ndarray) -> np.ndarray:
-        """φ before the drop at a depth, m."""
-        phi = self.filling_factor + self.crust[0] * np.exp(-depth / self.crust[1]) + self.gradient * depth
-        return phi + self.layers[0] * np.sin(2.0 * np.pi * depth / self.layers[1])
+        """φ before the drop at a depth, m; a gradient ends where there is hardly a strength, or what the dust bears of its own
+        weight goes with the depth of the mesh."""
+        loosest = min(self.filling_factor, self.phi_1 + LOOSEST)
+        graded = np.maximum(self.filling_factor + self.gradient * depth, loosest)
+        layers = self.layers[0] * np.sin(2.0 * np.pi * depth / self.layers[1])
+        return graded + self.crust[0] * np.exp(-depth / self.crust[1]) + layers
 
 
 @dataclass(frozen=True)

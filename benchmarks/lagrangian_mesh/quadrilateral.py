@@ -19,6 +19,7 @@ COLUMNS = 10  # PLASTIC: equivalent plastic strain of shear; STRENGTH: factor on
 # entries of what has been spent, J per radian
 STRESS_WORK, VISCOUS, HOURGLASS = range(3)
 EDGE = 0.002  # of φ to the poles of Σ: below it Σ stays as it is there, above it follows its tangent
+SLIP = 1e-3  # m/s, below which friction on the way up is less
 REFERENCE = 0.15  # φ at which the bulk modulus is stated
 
 
@@ -174,11 +175,14 @@ def find_surface(r, z, tip, radius, sphere):
 @njit(inline="always")
 def resist(depth, speed, forces):
     """Upward force on the projectile, beside the dust's stress. depth, speed : downwards; forces : side and shaft's drag per
-    immersed length, pull, drag with v, with v², film, the depth that it reaches to."""
+    immersed length, pull, drag with v, with v², film, the depth that it reaches to. On the way back up friction and drags act
+    downwards; the film is broken."""
     if depth <= 0.0:
         return 0.0
     if speed <= 0.0:
-        return forces[2]
+        back = -speed
+        rubbing = forces[0] * min(back / SLIP, 1.0) + forces[1] * back * back
+        return forces[2] - rubbing * depth - (forces[3] + forces[4] * back) * back
     moving = (forces[0] + forces[1] * speed * speed) * depth + (forces[3] + forces[4] * speed) * speed
     if depth < forces[6]:
         moving += forces[5]

@@ -171,6 +171,18 @@ def test_what_campaigns_hide_holds_a_drop_back_and_closes_its_book(dust, forces)
     assert (held.energies["forces"] + held.energies["gathered mass"] > 0.0) == bool(forces)
 
 
+def test_how_deep_the_mesh_is_does_not_matter_where_the_dust_gets_looser_downwards():
+    """φ falls by 0.034 a cm: without an end near φ1 a tip of 1.5 mm goes 3 % deeper in 7 radii of dust than in 6, 45 % in 9."""
+    dust = mesh.Dust(p_m=1350.0, gradient=-3.4)
+    depths = [
+        mesh.run_drop(dust, 1.5e-3, 0.5, mesh.Numerics(cells=6.0, depth=depth)).stopping_depth
+        for depth in (6.0, 9.0)
+    ]
+    bead = Projectile("hemisphere", 1.5e-3, mesh.BEAD * 1.5e-3**3)
+    run = simulate(DropSetting(bead, 0.5, Material(p_m=1350.0), filling_gradient=-3.4, spacing=0.3e-3))
+    assert depths == pytest.approx([run.penetration_depth] * 2, rel=0.006)
+
+
 def test_dust_that_shear_weakens_lets_a_drop_go_deeper_and_closes_its_book():
     plain = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
     let = mesh.run_drop(mesh.Dust(weakening=0.4), RADIUS, 0.30)

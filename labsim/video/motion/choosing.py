@@ -21,6 +21,7 @@ ODDS = {  # of an ending, beside rest and rebound, before the rows are looked at
     "bounce": 0.05,  # thrown back by more than the push at the stop: something else than dust
 }
 LEAST_WEIGHT = 1e-3  # of the best model's: below, a model is forgotten
+FAR = 80.0  # -2 ln(evidence) behind the best at its degree: of 70 tracks no ending came back from 30
 PULL = 1.0  # of the mean deceleration: dust does not pull a projectile in, but a polynomial rings a little at contact
 NOISE_KNOWN = 20.0  # frames that the stated error bars are worth when the noise level is judged
 
@@ -119,7 +120,7 @@ def choose_motion(
     depth: FloatArray,
     error: FloatArray,
     start: tuple[float, float],
-    endings: tuple[Ending, ...] = ("rest", "ease", "rebound", "bounce"),
+    endings: tuple[Ending, ...] = ("rebound", "bounce", "rest", "ease"),
 ) -> Choice | None:
     """Every model that explains the rows, weighed by Schwarz's criterion (Kass & Raftery 1995); None if none does.
 
@@ -129,6 +130,7 @@ def choose_motion(
     stops = time[-1] > start[1] + 2.5 * float(np.median(np.diff(time)))
     first = ~guess_spikes(depth, error)
     found: list[Candidate] = []
+    best: Candidate | None = None
     for ending in endings if stops else ("open",):
         lead: Candidate | None = None
         for degree in range({"ease": 1, "open": 1}.get(ending, 0), HIGHEST_DEGREE + 1):
@@ -151,11 +153,13 @@ def choose_motion(
             found.append(here)
             if lead is None or here.judge(1.0) < lead.judge(1.0):
                 lead = here
-            if degree > lead.motion.degree + 2:
+            if best is None or here.judge(1.0) < best.judge(1.0):
+                best = here
+            behind = here.judge(1.0) - best.judge(1.0)
+            if degree > lead.motion.degree + 2 or (degree >= best.motion.degree and behind > FAR):
                 break
-    if not found:
+    if best is None:
         return None
-    best = min(found, key=lambda candidate: candidate.judge(1.0))
     noise = (best.motion.chi_square + NOISE_KNOWN) / (best.motion.freedom + NOISE_KNOWN)
     found.sort(key=lambda candidate: candidate.judge(noise))
     criteria = np.array([candidate.judge(noise) for candidate in found])

@@ -15,7 +15,8 @@ LEAST_STEP = 17.0  # error bars per frame: below, a missing frame cannot be told
 MOST_WEIGHED = 4
 MOST_MISSING = 8
 MOST_PLACES = 80  # places tried
-RUN = 3  # outliers side by side that make one ask for the clock
+RUN = 3  # outliers side by side that make one ask for the clock, at least
+BY_CHANCE = 0.01  # runs of outliers in a track that are spikes side by side, at most
 AROUND = 8  # frames on either side that say whether the projectile moves at a repeated row
 CLEAR = 6.0  # error bars per frame: it moves
 LEAST_MOTION = 0.5  # px per frame: it moves, where rows are rounded
@@ -131,20 +132,23 @@ def find_lost_frames(
 ) -> tuple[int, int, Choice] | None:
     """(index of the first frame after a gap that the clock hides, frames lost there, the motion with the clock put right).
 
-    time (s), depth, error (m): (n,) as they were fitted from ``start`` to ``choice``. Asked where RUN outliers lie side by side
-    or the rows scatter more than they say: then every place about them is tried with one frame more, with two, up to
-    MOST_MISSING. Of the MOST_WEIGHED counts that a simple motion likes best motions that rest choose one; it is taken if it gains
-    what an outlier costs and what so many trials bring by chance. None otherwise.
+    time (s), depth, error (m): (n,) as they were fitted from ``start`` to ``choice``. Asked where more outliers lie side
+    by side than chance brings, or the rows scatter more than they say: then every place about them is tried with one frame
+    more, with two, up to MOST_MISSING. Of the MOST_WEIGHED counts that a simple motion likes best motions that rest choose
+    one; it is taken if it gains what an outlier costs and what so many trials bring by chance. None otherwise.
     """
     best = choice.best
     out = np.flatnonzero(~best.used)
-    run = [i for i in out if all(k in out for k in range(i, i + RUN))]
+    # where many rows are spikes, some lie side by side by chance: so many do not
+    share = max(out.size, 1) / len(time)
+    many = max(RUN, int(np.ceil(np.log(BY_CHANCE / len(time)) / np.log(share))))
+    run = [i for i in out if np.isin(np.arange(i, i + many), out).all()]
     scatter = best.motion.chi_square > best.motion.freedom + 3.0 * np.sqrt(2.0 * max(best.motion.freedom, 1))
     if not run and not scatter:
         return None
     spacing = float(np.median(np.diff(time)))
     within = np.flatnonzero((time > start[0] - 10 * spacing) & (time < start[1]))
-    first, last = (run[0], run[-1] + RUN) if run else (within[0], within[-1])
+    first, last = (run[0], run[-1] + many) if run else (within[0], within[-1])
     places = np.arange(max(first - 3, 3), min(last + 4, len(time) - 3))
     if len(places) > MOST_PLACES:
         places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numba import njit
 from numpy.polynomial import Legendre, Polynomial
 
 from ...records import FloatArray
@@ -134,7 +135,7 @@ def order_columns(by_ends: FloatArray, by_linear: FloatArray) -> FloatArray:
 def _unload(e: FloatArray, loose: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Depth, speed and acceleration of a spring's unloading per its push at te, and the derivative of the depth by λ, (n,) each.
 
-    e : (n,) s since te, 0 before it.
+    e : (n,) s since te.
     """
     phase = 0.5 * np.pi / loose
     pushed = e < loose
@@ -150,80 +151,114 @@ def _unload(e: FloatArray, loose: float) -> tuple[FloatArray, FloatArray, FloatA
     return depth, sine / phase, acceleration, by_loose
 
 
-def _tabulate_legendre(highest: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Powers of u in P_k(2u - 1), in its integral from 0 and in the integral of that: (highest + 1, highest + 3) each."""
-    tables = [np.zeros((highest + 1, highest + 3)) for _ in range(3)]
+def _tabulate_legendre(highest: int) -> FloatArray:
+    """Powers of u in P_k(2u - 1), in its integral from 0 and in the integral of that: (3, highest + 1, highest + 3)."""
+    tables = np.zeros((3, highest + 1, highest + 3))
     for k in range(highest + 1):
         power = Legendre.basis(k, domain=(0.0, 1.0)).convert(kind=Polynomial)
         for table, each in zip(tables, (power, power.integ(), power.integ(2)), strict=True):
             table[k, : len(each.coef)] = each.coef
-    return tables[0], tables[1], tables[2]
+    return tables
 
 
 HIGHEST_DEGREE = 7
 _TABLES = _tabulate_legendre(HIGHEST_DEGREE)
 
 
-def _integrate_legendre(u: FloatArray, degree: int, orders: int) -> list[FloatArray]:
-    """Twofold integral of P_k(2u - 1) from 0, its integral and itself (the first ``orders`` of them), (degree + 1, n) each."""
-    powers = np.vander(u, degree + 3, increasing=True).T
-    return [table[: degree + 1, : degree + 3] @ powers for table in _TABLES[::-1][:orders]]
+@njit(cache=True)
+def _fill_columns(t, t0, te, degree, tables, columns):  # pragma: no cover - compiled
+    """Depth, speed and acceleration per v0, g and each c, where the dust pushes and no more once it has ceased.
+
+    tables : (3, m, m + 2) as ``_TABLES``; columns : (orders, p, n), zero before.
+    """
+    orders, span = columns.shape[0], te - t0
+    for i in range(t.size):
+        since = t[i] - t0
+        if orders > 1:
+            columns[1, 0, i] = 1.0
+        if since < 0.0:
+            columns[0, 0, i], columns[0, 1, i] = since, 0.5 * since**2
+            if orders > 1:
+                columns[1, 1, i] = since
+            if orders > 2:
+                columns[2, 1, i] = 1.0
+        elif t[i] <= te:
+            columns[0, 0, i] = since
+            u = since / span
+            for order in range(orders):
+                table, scale = tables[2 - order], span ** (2 - order)
+                for k in range(degree + 1):
+                    value = 0.0
+                    for power in range(k + 2 - order, -1, -1):
+                        value = value * u + table[k, power]
+                    columns[order, 2 + k, i] = scale * value
+        else:  # at te: ∫ P_0 = 1, ∫∫ P_0 = 1/2, ∫∫ P_1 = -1/6, all others vanish there
+            e = t[i] - te
+            columns[0, 0, i] = since
+            columns[0, 2, i] = 0.5 * span**2 + span * e
+            if degree > 0:
+                columns[0, 3, i] = -(span**2) / 6.0
+            if orders > 1:
+                columns[1, 2, i] = span
 
 
 def design_motion(
     t: FloatArray, ends: FloatArray, degree: int, ending: Ending, orders: int = 3
-) -> list[FloatArray]:
-    """Derivatives of depth, speed and acceleration (the first ``orders`` of them) by (v0, g, c…, …): (p, n) each.
+) -> FloatArray:
+    """Derivatives of depth, speed and acceleration (the first ``orders`` of them) by (v0, g, c…, …): (orders, p, n).
 
     ends : (t0, te) or, of a rebound, (t0, te, λ).
     """
     t0, te = ends[:2]
-    span = te - t0
-    before, after = t < t0, t > te
-    inside = np.flatnonzero(~before & ~after)
-    s = np.where(before, t - t0, 0.0)
-    e = np.where(after, t - te, 0.0)
-    integrals = _integrate_legendre((t[inside] - t0) / span, degree, orders)
-    columns: list[FloatArray] = [
-        np.zeros((degree + 3 + {"rebound": 1, "bounce": 2}.get(ending, 0), len(t))) for _ in range(orders)
-    ]
-    z = columns[0]
-    z[0], z[1] = np.where(before, s, np.clip(t - t0, 0.0, span) + e), 0.5 * s**2
-    # at te: ∫ P_0 = 1, ∫∫ P_0 = 1/2, ∫∫ P_1 = -1/6, all others vanish there
-    z[2, after] = 0.5 * span**2 + span * e[after]
-    if degree > 0:
-        z[3, after] = -(span**2) / 6.0
-    flight = np.maximum(e - ends[2], 0.0) if ending == "rebound" else e
+    columns = np.zeros((orders, degree + 3 + {"rebound": 1, "bounce": 2}.get(ending, 0), len(t)))
+    _fill_columns(t, t0, te, degree, _TABLES, columns)
     if ending in ("rebound", "bounce"):
-        z[-1] = 0.5 * flight**2
-    if ending == "bounce":
-        z[-2] = e
-    if orders > 1:
-        v = columns[1]
-        v[0], v[1], v[2, after] = 1.0, s, span
-        if ending in ("rebound", "bounce"):
-            v[-1] = flight
+        after = np.flatnonzero(t > te)
+        e = t[after] - te
+        flight = np.maximum(e - ends[2], 0.0) if ending == "rebound" else e
+        for rows, one in zip(columns, (0.5 * flight**2, flight, flight > 0.0), strict=False):
+            rows[-1, after] = one
         if ending == "bounce":
-            v[-2] = after
-    if orders > 2:
-        columns[2][1] = before
-        if ending in ("rebound", "bounce"):
-            columns[2][-1] = flight > 0.0
-    if ending == "rebound":  # P_k = 1 at te: every c has its share in the push there
-        for rows, one in zip(columns, _unload(e, ends[2]), strict=False):
-            rows[2 : degree + 3, after] += one[after]
-    for k, rows in enumerate(columns):
-        rows[2 : degree + 3, inside] = span ** (2 - k) * integrals[k]
+            for rows, one in zip(columns, (e, 1.0), strict=False):
+                rows[-2, after] = one
+        else:  # P_k = 1 at te: every c has its share in the push there
+            for rows, one in zip(columns, _unload(e, ends[2]), strict=False):
+                rows[2 : degree + 3, after] += one
     if ending == "ease":  # the last c is minus the sum of the others
-        for rows in columns:
-            rows[2:-1] -= rows[-1]
-        columns = [rows[:-1] for rows in columns]
+        columns[:, 2:-1] -= columns[:, -1:]
+        columns = columns[:, :-1]
     if ending != "open":  # v(te) = 0: c_0 = -v0/span
-        for rows in columns:
-            rows[0] -= rows[2] / span
-            rows[2:-1] = rows[3:]
-        columns = [rows[:-1] for rows in columns]
+        columns[:, 0] -= columns[:, 2] / (te - t0)
+        columns[:, 2:-1] = columns[:, 3:]
+        columns = columns[:, :-1]
     return columns
+
+
+@njit(cache=True)
+def _fill_slopes(t, t0, te, v0, g, twice, once, by_span, faster, slopes):  # pragma: no cover - compiled
+    """Derivatives of the depth by t0 and te of a motion that rests after te, or goes on as fast.
+
+    twice, once : the powers of u in Σ c_k times the twofold and the single integral of P_k; by_span : in how the first changes
+    with te - t0; faster : how the speed at te changes with te - t0; slopes : (n, 2), zero before.
+    """
+    span = te - t0
+    for i in range(t.size):
+        since = t[i] - t0
+        if since < 0.0:
+            slopes[i, 0] = -v0 - g * since
+            continue
+        u = min(since / span, 1.0)
+        a = b = c = 0.0
+        for power in range(twice.size - 1, -1, -1):
+            a, b, c = a * u + twice[power], b * u + once[power], c * u + by_span[power]
+        grow = 2.0 * span * a + span**2 * c  # by te - t0, at te or for given u
+        speed = v0 + span * b
+        if t[i] <= te:
+            grow -= span * u * b
+            slopes[i, 0], slopes[i, 1] = -speed - grow, grow
+        else:
+            grow += v0 + faster * (t[i] - te)
+            slopes[i, 0], slopes[i, 1] = -grow, grow - speed
 
 
 def differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Ending) -> FloatArray:
@@ -240,33 +275,19 @@ def differentiate_ends(t: FloatArray, p: FloatArray, degree: int, ending: Ending
             by_span[degree] = -by_span[0]
     else:
         c[:] = p[4 : 5 + degree]
-    before, after = t < t0, t > te
-    inside = np.flatnonzero(~before & ~after)
-    u = (t[inside] - t0) / span
-    twice, once = _integrate_legendre(u, degree, 2)
-    end = np.zeros(degree + 1)
-    end[0] = 0.5
-    if degree > 0:
-        end[1] = -1.0 / 6.0
-    e = t[after] - te
-    push, kick = (p[-1], p[-2]) if ending == "bounce" else (0.0, 0.0)
+    # Σ c_k times the twofold and the single integral of P_k, as polynomials of u
+    twice, once, twice_by_span = (
+        weights @ table[: degree + 1, : degree + 3]
+        for weights, table in ((c, _TABLES[2]), (c, _TABLES[1]), (by_span, _TABLES[2]))
+    )
     slopes = np.zeros((len(t), 2))
-    slopes[before, 0] = -v0 - g * (t[before] - t0)
-    for k, (grows, since) in enumerate(((-1.0, -1.0), (1.0, 0.0))):  # how te - t0 and t - t0 change
-        slopes[inside, k] = (
-            v0 * since
-            + 2 * span * grows * (c @ twice)
-            + span * (since - u * grows) * (c @ once)
-            + span**2 * grows * (by_span @ twice)
-        )
-        slopes[after, k] = (
-            v0 * grows
-            + 2 * span * grows * (c @ end)
-            + span**2 * grows * (by_span @ end)
-            + grows * (c[0] + span * by_span[0]) * e
-            - (k == 1) * (v0 + span * c[0] + kick + push * e)
-        )
-    if ending != "rebound":
+    _fill_slopes(t, t0, te, v0, g, twice, once, twice_by_span, c[0] + span * by_span[0], slopes)
+    if ending not in ("rebound", "bounce"):
+        return slopes
+    after = t > te
+    e = t[after] - te
+    if ending == "bounce":
+        slopes[after, 1] -= p[-2] + p[-1] * e
         return slopes
     flight, since = p[-2], np.maximum(e - p[-1], 0.0)
     depth, speed, _, by_loose = _unload(e, p[-1])

@@ -92,7 +92,8 @@ def fit_motion(
 
     def solve(q: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
         matrix = build(q)
-        scale = np.linalg.norm(matrix, axis=0) + 1e-300
+        scale = np.linalg.norm(matrix, axis=0)
+        scale[scale == 0.0] = 1.0  # too few frames in the dust: not seen
         left, size, right = np.linalg.svd(matrix / scale, full_matrices=False)
         inverse = np.where(size > 1e-11 * size[0], 1.0 / np.maximum(size, 1e-300), 0.0)
         linear = right.T @ (inverse * (left.T @ target)) / scale
