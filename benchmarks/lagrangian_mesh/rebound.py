@@ -1,6 +1,6 @@
 """How far a drop comes back up after its stop: labsim beside the Lagrangian mesh and material points.
 
-    python -m benchmarks.lagrangian_mesh.rebound [--cells 5 8] [--points]
+    python -m benchmarks.lagrangian_mesh.rebound [--cells 5 8] [--points] [--box 6 7]
 
 Prints, for several dusts and drops, the way up (µm) a quarter and half a stopping time after the stop, of the mesh and of labsim
 with each number of spacings in a tip radius, and by how much labsim differs. --points: of material points too, in minutes.
@@ -48,6 +48,7 @@ def main() -> None:
     )
     parser.add_argument("--cells", type=float, nargs="+", default=[5.0, 8.0])
     parser.add_argument("--points", action="store_true")
+    parser.add_argument("--box", type=float, nargs=2, help="width and depth of labsim's dust, tip radii")
     options = parser.parse_args()
     print(
         "radius mm, speed m/s, p_m Pa, K0 kPa, T/T0, Y/Y0 | way up of the mesh, µm | of others, with the difference in %"
@@ -62,6 +63,7 @@ def main() -> None:
             f"{x:.1f}" for x in lift
         )
         others = {}
+        width, depth = (None, None) if options.box is None else (each * radius for each in options.box)
         for cells in options.cells:
             material = Material(p_m=p_m, bulk_modulus=bulk, shear_factor=shear)
             material = material.replace(tensile_log10_a=material.tensile_log10_a + math.log10(tensile))
@@ -72,6 +74,8 @@ def main() -> None:
                     material,
                     spacing=radius / cells,
                     after_stop=AFTER[-1],
+                    width=width,
+                    depth=depth,
                 )
             )
             others[f"labsim {cells:g}"] = measure_lift(

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.lagrangian_mesh import mesh, quadrilateral
 from benchmarks.lagrangian_mesh.cavity import grow_cavity, solve_cavity
 from benchmarks.lagrangian_mesh.drop import find_limits
+from benchmarks.lagrangian_mesh.rebound import measure_lift
 from benchmarks.lagrangian_mesh.tip import measure_tip
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
@@ -181,6 +182,30 @@ def test_how_deep_the_mesh_is_does_not_matter_where_the_dust_gets_looser_downwar
     bead = Projectile("hemisphere", 1.5e-3, mesh.BEAD * 1.5e-3**3)
     run = simulate(DropSetting(bead, 0.5, Material(p_m=1350.0), filling_gradient=-3.4, spacing=0.3e-3))
     assert depths == pytest.approx([run.penetration_depth] * 2, rel=0.006)
+
+
+@pytest.mark.parametrize("bulk", [15e3, 135e3])
+def test_a_drop_is_thrown_back_as_far_as_by_the_mesh(bulk):
+    """Three times as far by dust that is nine times as soft."""
+    bead = Projectile("hemisphere", RADIUS, mesh.BEAD * RADIUS**3)
+    material = Material(p_m=1300.0, bulk_modulus=bulk)
+    run = simulate(DropSetting(bead, 0.5, material, spacing=RADIUS / 5, after_stop=0.5))
+    numerics = mesh.Numerics(depth=6.0)
+    found = mesh.run_drop(mesh.Dust(bulk_modulus=bulk), RADIUS, 0.5, numerics, after=1.5)
+    ours = measure_lift(run.time, run.depth, run.stopping_time, run.penetration_depth)
+    theirs = measure_lift(found.time, found.depth, found.stopping_time, found.stopping_depth)
+    assert ours == pytest.approx(theirs, rel=0.08)
+    assert theirs[1] == pytest.approx({15e3: 44e-6, 135e3: 14e-6}[bulk] * 1e6, rel=0.08)
+
+
+def test_friction_holds_a_drop_down_on_its_way_back():
+    lifts, books = [], []
+    for side in (0.0, 0.3):
+        run = mesh.run_drop(mesh.Dust(), RADIUS, 0.3, forces=mesh.Forces(side=side), after=1.5)
+        lifts.append(measure_lift(run.time, run.depth, run.stopping_time, run.stopping_depth)[1])
+        books.append(abs(run.energy_error))
+    assert 0.0 < lifts[1] < 0.8 * lifts[0]
+    assert max(books) < 0.005
 
 
 def test_dust_that_shear_weakens_lets_a_drop_go_deeper_and_closes_its_book():
