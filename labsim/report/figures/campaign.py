@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import corner
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,7 +21,7 @@ from ...records import FloatArray
 from ..pages.drop_views import DropView
 from ..pages.map_views import MapView
 from .strengths import find_tests
-from .style import BLUE, COLOURS, GREY, INK, ORANGE, PHI, corner_side, new_figure
+from .style import BLUE, COLOURS, GREY, INK, ORANGE, PHI, new_corner, new_figure
 
 DIFFERENCE: dict[str, Any] = {"vmin": -0.03, "vmax": 0.03, "cmap": "RdBu_r"}
 
@@ -224,17 +223,9 @@ def draw_posterior(posterior: Posterior, path: Path) -> Path | None:
         values = posterior.samples(name)
         columns.append(values / 1e3 if name == "p_m_Pa" else values)
         labels.append(P_M if name == "p_m_Pa" else name.replace("_", " ").replace(".", ": "))
-    side = corner_side(len(columns))
-    with new_figure(path, side, side, layout=None) as figure:
-        corner.corner(
-            np.stack(columns, axis=1)[::10],
-            fig=figure,
-            labels=labels,
-            quantiles=[0.05, 0.5, 0.95],
-            show_titles=True,
-            title_fmt=".3g",
-            color=BLUE,
-        )
+    values = np.stack(columns, axis=1)[::10]
+    with new_corner(path, values, labels=labels, quantiles=[0.05, 0.5, 0.95], title_fmt=".3g"):
+        pass
     return path
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import corner
 import matplotlib
 import numpy as np
 
@@ -13,7 +12,7 @@ from ...diagnosis.published.scan import compacted_area
 from ...inference.published.calibrate import SummaryCalibration
 from ...inference.published.figures import impact_speed
 from ...inference.published.planar import expected_raw_depth, round_depth
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, corner_side, new_figure
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, new_corner, new_figure
 
 
 def draw_penetration(calibration: SummaryCalibration, path: Path) -> Path:
@@ -192,28 +191,24 @@ def draw_corner(calibration: SummaryCalibration, path: Path) -> Path:
         if truth is not None:
             low, high = min(low, truth), max(high, truth)
         ranges.append((low - 0.05 * (high - low), high + 0.05 * (high - low)))
-    side = corner_side(data.shape[1])
-    with new_figure(path, side, side, layout=None) as figure:
-        corner.corner(
-            data,
-            fig=figure,
-            labels=[
-                "$p_\\mathrm{m}$ (kPa)",
-                f"raw depth of {drop} (mm)",
-                f"$T_\\mathrm{{s}}$ of {drop} (ms)",
-            ],
-            truths=truths,
-            truth_color=ORANGE,
-            color=BLUE,
-            range=ranges,
-            quantiles=(0.05, 0.5, 0.95),
-            show_titles=True,
-            title_fmt=".2f",
-            title_kwargs={"fontsize": 9},
-            plot_contours=False,
-            plot_density=False,
-            data_kwargs={"alpha": 0.05, "ms": 2.0},
-        )
+    with new_corner(
+        path,
+        data,
+        labels=[
+            "$p_\\mathrm{m}$ (kPa)",
+            f"raw depth of {drop} (mm)",
+            f"$T_\\mathrm{{s}}$ of {drop} (ms)",
+        ],
+        truths=truths,
+        truth_color=ORANGE,
+        range=ranges,
+        quantiles=(0.05, 0.5, 0.95),
+        title_fmt=".2f",
+        title_kwargs={"fontsize": 9},
+        plot_contours=False,
+        plot_density=False,
+        data_kwargs={"alpha": 0.05, "ms": 2.0},
+    ) as figure:
         figure.text(
             0.98,
             0.98,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from ...records import FloatArray
 from .formats import further_formats
 
 INK, BLUE, ORANGE, GREEN, PURPLE, GREY = "#222222", "#0072B2", "#D55E00", "#009E73", "#8E4A9E", "#8A8A8A"
@@ -51,6 +53,14 @@ def new_figure(
             figure.savefig(path.with_suffix(f".{suffix}"), metadata={DATE[suffix]: None})
 
 
-def corner_side(count: int) -> float:
-    """Inches across a corner plot of so many parameters."""
-    return 2.1 * count + 1.3
+@contextmanager
+def new_corner(path: Path, values: FloatArray, **options: Any) -> Iterator[Figure]:
+    """A new picture of samples (n, k), each against each; options : of ``corner.corner``."""
+    with warnings.catch_warnings():
+        # arviz, which corner imports, announces its own rewriting once a day
+        warnings.simplefilter("ignore", FutureWarning)
+        import corner
+    side = 2.1 * values.shape[1] + 1.3
+    with new_figure(path, side, side, layout=None) as figure:
+        corner.corner(values, fig=figure, color=BLUE, show_titles=True, **options)
+        yield figure
