@@ -50,8 +50,8 @@ class Dust:
         )  # fmt: skip
 
     def fill(self, depth: np.ndarray) -> np.ndarray:
-        """φ before the drop at a depth, m; a gradient ends where there is hardly a strength, or what the dust bears of its own
-        weight goes with the depth of the mesh."""
+        """φ before the drop at a depth, m. A falling one ends near φ1: looser dust does not bear its weight, and how far it sinks
+        goes with how deep the mesh is."""
         loosest = min(self.filling_factor, self.phi_1 + LOOSEST)
         graded = np.maximum(self.filling_factor + self.gradient * depth, loosest)
         layers = self.layers[0] * np.sin(2.0 * np.pi * depth / self.layers[1])

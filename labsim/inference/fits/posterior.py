@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import emcee
@@ -186,9 +187,7 @@ def sample(
             progress(done, max(done, 2000), "sampling the posterior")
     discard = int(5 * tau)
     chain = sampler.get_chain(discard=discard)  # (steps, walkers, d)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # arviz announces its own rewriting at every import
-        import arviz
+    arviz = import_arviz()
     groups = np.swapaxes(chain, 0, 1)
     data = arviz.from_dict(
         posterior={name: transform(name, groups[:, :, k]) for k, name in enumerate(names)},
@@ -199,6 +198,14 @@ def sample(
         r_hat = max(float(arviz.rhat(quarters[:, :, k])) for k in range(d))
     total = chain.shape[0] * walkers
     return Posterior(tuple(names), data, r_hat, total / tau, int(chain.shape[0]), tau)
+
+
+def import_arviz() -> ModuleType:
+    """arviz, without what it says of its own rewriting at the first import of a day."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        import arviz
+    return arviz
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -56,10 +55,11 @@ def new_figure(
 @contextmanager
 def new_corner(path: Path, values: FloatArray, **options: Any) -> Iterator[Figure]:
     """A new picture of samples (n, k), each against each; options : of ``corner.corner``."""
-    with warnings.catch_warnings():
-        # arviz, which corner imports, announces its own rewriting once a day
-        warnings.simplefilter("ignore", FutureWarning)
-        import corner
+    from ...inference.fits.posterior import import_arviz  # pictures without samples need neither
+
+    import_arviz()  # which corner imports
+    import corner
+
     side = 2.1 * values.shape[1] + 1.3
     with new_figure(path, side, side, layout=None) as figure:
         corner.corner(values, fig=figure, color=BLUE, show_titles=True, **options)

@@ -142,13 +142,14 @@ def find_lost_frames(
     # where many rows are spikes, some lie side by side by chance: so many do not
     share = max(out.size, 1) / len(time)
     many = max(RUN, int(np.ceil(np.log(BY_CHANCE / len(time)) / np.log(share))))
-    run = [i for i in out if np.isin(np.arange(i, i + many), out).all()]
+    ends = out[many - 1 :]
+    run = out[: ends.size][ends - out[: ends.size] == many - 1]
     scatter = best.motion.chi_square > best.motion.freedom + 3.0 * np.sqrt(2.0 * max(best.motion.freedom, 1))
-    if not run and not scatter:
+    if not run.size and not scatter:
         return None
     spacing = float(np.median(np.diff(time)))
     within = np.flatnonzero((time > start[0] - 10 * spacing) & (time < start[1]))
-    first, last = (run[0], run[-1] + many) if run else (within[0], within[-1])
+    first, last = (run[0], run[-1] + many) if run.size else (within[0], within[-1])
     places = np.arange(max(first - 3, 3), min(last + 4, len(time) - 3))
     if len(places) > MOST_PLACES:
         places = np.unique(np.linspace(places[0], places[-1], MOST_PLACES).astype(int))
