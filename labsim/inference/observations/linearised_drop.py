@@ -14,6 +14,7 @@ from scipy.spatial.distance import cdist
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph import DropSetting
+from ..emulation.curves import FRACTIONS
 from ..emulation.forward import Instant
 from .acceleration_model import AccelerationModel
 from .drop_model import ALONG, FREE, REACH, SPEED_WIDTH, DropModel
@@ -37,6 +38,7 @@ class ErrorBudget:
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.005  # of the depth, smooth
+    numerical_rebound: float = 0.08  # of the way back up after the stop, smooth
     numerical_change: float = 0.03  # of what an effect changes of a depth or of a push's resistance, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
@@ -146,7 +148,6 @@ def linearise_drop(
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
-    final, stop = np.exp(features[0]), np.exp(features[1])
     local = np.column_stack([*columns, own_errors[:, 1:]])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
@@ -173,13 +174,15 @@ def linearise_drop(
     if with_others:
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
-    off, length, changes = model.find_solver_error(here, clock, final, instrument, budget.numerical)
+    off, length, changes = model.find_solver_error(
+        here, clock, features, instrument, (budget.numerical, budget.numerical_rebound)
+    )
     if model.changes_differ and features is not response.plain:
         change = here - model.predict(response.plain, instrument, instant)
         off = np.hypot(off, budget.numerical_change * change)
     numerical = NumericalError(
         off,
-        np.clip(clock / stop, 0.0, 1.0),
+        np.clip(clock / np.exp(features[1]), 0.0, FRACTIONS[-1]),
         reach,
         math.log(model.radius),
         math.log(mass.mass / model.radius**3),
