@@ -205,7 +205,9 @@ def test_free_fall_gives_contact_and_speed_and_outliers_go():
     assert observed.contact_time == pytest.approx(0.0081, abs=1e-5)
     assert observed.impact_speed == pytest.approx(0.785, rel=2e-3)
     after = 0.0081 + (1 + REBOUND) * observed.curve.stopping_time.value
-    assert after - 2e-4 < observed.time.max() <= after + 1e-5  # the way back up is seen, what follows is left out
+    assert (
+        after - 2e-4 < observed.time.max() <= after + 1e-5
+    )  # the way back up is seen, what follows is left out
 
 
 def test_a_hard_stop_loses_no_frame():

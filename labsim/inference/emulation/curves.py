@@ -1,8 +1,8 @@
 """From a handful of runs of one drop to its depth curve anywhere near them.
 
 The features of a run are (ln D, ln T_s, s(τ)): depth over D at fixed fractions τ of the stopping time, to a third of it beyond
-the stop, where the dust springs back. These are smooth in every parameter even where the curve itself is not (its kink moves with the stop), so low
-polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.md gives the measured error.
+the stop, where the dust springs back. These are smooth in every parameter even where the curve itself is not (its kink moves
+with the stop), so low polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.md gives the measured error.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ SLACK = 0.25  # of one ratio, which all together may be longer: a node more for 
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, 1.3
-# of the stopping time: runs of drops go on for as long as features of them do (curves.py), those of scans until the dust has settled
+# of the stopping time: runs of drops go on for as long as their features do (curves.py), those of scans until the dust settles
 AFTER_STOP, SETTLING = 0.36, 0.16
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 # of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more

@@ -73,7 +73,10 @@ def _list_warnings(seen: Observed) -> tuple[str, ...]:
 
 
 def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
-    """Depths on the stated scale up to a third of the stopping time after the stop, outliers removed. Raises MeasurementError where nothing is left."""
+    """Depths on the stated scale up to a third of the stopping time after the stop, outliers removed.
+
+    Raises MeasurementError where nothing is left.
+    """
     assert drop.camera is not None
     pixel = drop.camera.pixel_size
     place = drop.record.path or drop.name
