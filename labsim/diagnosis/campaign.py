@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -44,7 +44,7 @@ from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_ou
 from .judge import NESTED, PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
 from .pairs import confirm_pairs, refine_leading, return_to_singles
-from .screen import CLOSE, Score, Screening, has_runs, list_confusable, screen
+from .screen import CLOSE, Score, Screening, draw_strengths, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unlisted.free_law import fit_hats, needs_free_law
 from .unlisted.learned_law import LearnedLaw, learn_law
@@ -281,7 +281,18 @@ def diagnose_campaign(
         )
     sampled = {fit.hypothesis: chain.calibrated for fit, chain in ((nominal, posterior), (best, extended))}
     rivals = [allow_for_codes(problem, nominal, fit) for fit in found.rivals]
-    averaged = average_p_m(found.verdict, nominal, rivals, campaign.p_m_range, sampled=sampled, seed=seed)
+    averaged = average_p_m(
+        found.verdict,
+        nominal,
+        rivals,
+        campaign.p_m_range,
+        sampled=sampled,
+        screened={
+            (name,): partial(draw_between_codes, problem, found.screening, name)
+            for name in found.screening.names
+        },
+        seed=seed,
+    )
     about = best if found.verdict.word == "effect" else nominal
     untestable = list_untestable(problem, about)
     learned, tangents = None, found.unknown.tangents
@@ -325,6 +336,17 @@ def allow_for_codes(problem: Problem, nominal: Fit, fit: Fit) -> Fit:
         return fit
     beside = problem.budget.change_of_strength * abs(fit.log_p_m - nominal.log_p_m)
     return replace(fit, between_codes=math.hypot(problem.budget.other_codes, beside))
+
+
+def draw_between_codes(
+    problem: Problem, screening: Screening, name: str, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Draws (count,) of ln p_m with an effect that was only screened, as another code would say them."""
+    drawn = draw_strengths(problem, screening, name, count, rng)
+    beside = 0.0
+    if problem.effects[name].kind == "material":
+        beside = problem.budget.change_of_strength * np.abs(drawn - screening.log_p_m)
+    return drawn + np.hypot(problem.budget.other_codes, beside) * rng.standard_normal(count)
 
 
 def check_leading(problem: Problem, leading: Fit, rng: np.random.Generator) -> float:

@@ -21,6 +21,7 @@ from ..inference.problem import Problem
 from ..records import FloatArray
 
 DRAWS = 20_000
+SPARE = 20  # draws for one inside all limits
 CONFUSABLE = 0.9  # cosine of fingerprints
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
 
@@ -106,6 +107,34 @@ def compare_linear(problem: Problem, screening: Screening, chosen: Sequence[int]
     Both are integrated over ln p_m inside its range and over amplitudes inside their limits: a nominal fit that its range stops
     is as bad as it is there, and what asks for an amplitude that cannot be explains nothing.
     """
+    rows, (strengths, *limits) = _lay_out(problem, screening, chosen)
+    data = len(rows) - len(limits)
+    nominal = integrate_linear(rows[:data, 1:2], rows[:data, 0], [strengths])
+    extended = integrate_linear(rows[:, 1:], rows[:, 0], [strengths, *limits])
+    cut = sum(log_share_inside(*between, 0.0, 1.0) for between in limits)  # of the priors
+    return extended - nominal - cut - 0.5 * len(limits) * math.log(2 * math.pi)
+
+
+def draw_strengths(
+    problem: Problem, screening: Screening, name: str, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Draws (count,) of ln p_m with one effect beside it, linear, inside the range of p_m and the effect's limits."""
+    rows, limits = _lay_out(problem, screening, [screening.names.index(name)])
+    information = rows[:, 1:].T @ rows[:, 1:]
+    covariance = np.linalg.inv(information)
+    drawn = rng.multivariate_normal(covariance @ rows[:, 1:].T @ rows[:, 0], covariance, SPARE * count)
+    low, high = np.transpose(limits)
+    inside = drawn[np.all((drawn > low) & (drawn < high), axis=1)]
+    if len(inside) < count:  # limits cut nearly all of it off: it lies at them
+        inside = np.clip(drawn, low, high)
+    return screening.log_p_m + inside[:count, 0]
+
+
+def _lay_out(
+    problem: Problem, screening: Screening, chosen: Sequence[int]
+) -> tuple[FloatArray, list[tuple[float, float]]]:
+    """Data, tangents of ln p_m and of amplitudes in units of their priors, (n, 2 + chosen), whitened, with a row of its prior
+    for each amplitude at the end; and the limits of ln p_m, from the fit's, and of the amplitudes."""
     place = list(chosen)
     parameters = [problem.effects[screening.names[k]].amplitudes[0] for k in place]
     limits = [
@@ -114,20 +143,14 @@ def compare_linear(problem: Problem, screening: Screening, chosen: Sequence[int]
     ]
     low, high = (math.log(p) - screening.log_p_m for p in problem.campaign.p_m_range)
     widths = [each.scale for each in parameters]
-    # data, ln p_m, amplitudes in units of their priors; the first row is all that lies along the tangent of ln p_m
+    # the first row is all that lies along the tangent of ln p_m
     along = np.concatenate([[screening.step, 1.0], screening.traded[place] * widths]) / screening.sigma
     beside = [
         screening.residual,
         np.zeros(len(screening.residual)),
         screening.fingerprints[:, place] * widths,
     ]
-    rows = np.vstack([along, np.column_stack(beside)])
-    nominal = integrate_linear(rows[:, 1:2], rows[:, 0], [(low, high)])
-    priors = np.eye(2 + len(place))[2:]
-    rows = np.vstack([rows, priors])
-    extended = integrate_linear(rows[:, 1:], rows[:, 0], [(low, high), *limits])
-    cut = sum(log_share_inside(*between, 0.0, 1.0) for between in limits)  # of the priors
-    return extended - nominal - cut - 0.5 * len(place) * math.log(2 * math.pi)
+    return np.vstack([along, np.column_stack(beside), np.eye(2 + len(place))[2:]]), [(low, high), *limits]
 
 
 def screen_pairs(problem: Problem, screening: Screening) -> list[tuple[tuple[str, str], float]]:
