@@ -346,9 +346,9 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         lines.append(f"  {probability:11.3f}  {' + '.join(hypothesis):{wide}}  {words}".rstrip())
     if others := found.verdict.probabilities[len(worth) :]:
         lines.append(f"  {sum(p for _, p in others):11.3f}  the {len(others)} others together")
-    if found.verdict.word == "effect" and found.verdict.probabilities[0][1] < CERTAIN:
+    if found.verdict.word != "unknown" and found.verdict.probabilities[0][1] < CERTAIN:
         low, high = np.quantile(found.p_m_averaged, [0.05, 0.95]) * factor
-        lines.append(f"  {label} whichever of these is at work: {low:.2f} to {high:.2f} {unit} (90 %)")
+        lines.append(f"  {label} whichever of these holds: {low:.2f} to {high:.2f} {unit} (90 %)")
     gain = found.gain
     shown, of_shown = (100.0, "%") if found.problem.pushed else (1e6, "µm")
     nearest = "the nearest listed cause, " if found.verdict.word == "unknown" else ""

@@ -141,10 +141,8 @@ def linearise_drop(
                 model.predict(moved, point.instruments[name], instant) - here
             ) / point.step
 
-    mass = observed.drop.projectile
-    scatter = math.hypot(budget.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
     own_errors = model.own_errors
-    own_strength = by_strength * max(scatter, LEAST_SCATTER)
+    own_strength = by_strength * max(budget.scatter, LEAST_SCATTER)
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
@@ -167,6 +165,10 @@ def linearise_drop(
         * budget.numerical_slope,
         "numerical strength": by_strength * budget.numerical_strength,
     }
+    projectile = observed.drop.projectile
+    if projectile.mass_sigma > 0.0:  # drops whose projectiles are described alike are of one projectile, weighed once
+        weighed = MASS_TO_STRENGTH * projectile.mass_sigma / projectile.mass
+        shared[f"mass of {projectile}"] = by_strength * weighed
     for setting, (amplitude, sigma) in model.numerics.items():
         if model.table.knows(setting):
             moved = model.predict(features + response.change(setting, amplitude), instrument, instant)
@@ -185,7 +187,7 @@ def linearise_drop(
         np.clip(clock / np.exp(features[1]), 0.0, FRACTIONS[-1]),
         reach,
         math.log(model.radius),
-        math.log(mass.mass / model.radius**3),
+        math.log(projectile.mass / model.radius**3),
         model.unit,
         length,
         changes,

@@ -83,10 +83,10 @@ def write_campaign_page(
                 _between(extended),
             ),
         )
-        if found.verdict.probabilities[0][1] < CERTAIN:
-            middle, spread = quantiles["over_causes"]["q50"] / 1e3, _between(quantiles["over_causes"])
-            tiles.insert(2, ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
         tiles.append(tile_gain(found.gain, "drops"))
+    if found.verdict.word != "unknown" and found.verdict.probabilities[0][1] < CERTAIN:
+        middle, spread = quantiles["over_causes"]["q50"] / 1e3, _between(quantiles["over_causes"])
+        tiles.insert(len(labels), ("p_m, whichever cause", f"{middle:.2f} kPa", spread))
     figures = _figures(found.problem, views, maps, posteriors)
     held = [(labels[0], found.held_out_nominal.rms)]
     if len(labels) > 1:
