@@ -1,6 +1,7 @@
 """Codes of curves, nodes, free fall, the linear algebra and the sampler, each against an answer known otherwise."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from labsim.inference.fits.blocks import solve_globals
 from labsim.inference.fits.evidence import log_share_inside
 from labsim.inference.fits.posterior import measure_residual, sample
 from labsim.inference.observations.compacted_zone import Block
+from labsim.inference.observations.drop_model import make_drop_model
+from labsim.inference.observations.linearised_drop import ErrorBudget, Perturbation, linearise_drop
 from labsim.inference.observations.observe import REBOUND, observe_drop
 from labsim.records import STANDARD_GRAVITY, Camera, Drop, Material, Measured, Projectile, Record, Track
 from labsim.sph import DropSetting, simulate
@@ -227,6 +230,55 @@ def test_a_hard_stop_loses_no_frame():
         kept = set(np.round(observed.time * camera.frame_rate).astype(int))
         assert kept >= set(range(46)) - {12, 30} and not kept & {12, 30}
         assert observed.rejected == 2
+
+
+def linearised(features, projectile, budget):
+    """One drop about one point, and its model; p_m moves depth as its power of -0.3."""
+    drop = replace(make_drop(), projectile=projectile)
+    observed = observe_drop(drop, synthetic_track(drop, np.random.default_rng(3)))
+    speeds = np.log([0.7, 0.8, 0.9])
+    table = ResponseTable(speeds, (0, 2))
+    for k in (-1, 0, 1):
+        moved = features.copy()
+        moved[0] -= 0.3 * k * math.log(2.0)
+        table.base[k] = np.stack([moved] * 3)
+    model = make_drop_model(observed, table)
+    here = Perturbation({}, {drop.name: Instrument()}, {}, lambda name: None, 1.0)
+    return linearise_drop(model, model.start, math.log(1000.0), here, budget, {}), model
+
+
+def test_drops_of_one_projectile_share_the_error_of_its_mass():
+    budget = ErrorBudget(heights=False)
+    known, weighed = (Projectile("hemisphere", 5e-4, 1.33e-6, mass_sigma=sigma) for sigma in (0.0, 6.65e-9))
+    errors = {
+        name: linearised(sine_features(), projectile, budget)[0]
+        for name, projectile in (
+            ("known", known),
+            ("one", weighed),
+            ("again", weighed),
+            ("heavier", replace(weighed, mass=2e-6)),
+        )
+    }
+    of_mass = {name: {key for key in drop.shared if "mass" in key} for name, drop in errors.items()}
+    assert not of_mass["known"] and len(of_mass["one"]) == 1
+    assert of_mass["one"] == of_mass["again"] != of_mass["heavier"]
+    (key,) = of_mass["one"]
+    # depth goes as m^0.9 where it goes as p_m^-0.3
+    assert errors["one"].shared[key] == pytest.approx(3.0 * 0.005 * errors["one"].tangents["ln_p_m"])
+    assert errors["one"].local == pytest.approx(errors["known"].local)
+
+
+def test_the_way_back_up_has_an_error_of_its_own():
+    features = sine_features()
+    after = np.maximum(FRACTIONS - 1.0, 0.0)
+    features[2:] -= 0.2 * after
+    projectile = Projectile("hemisphere", 5e-4, 1.33e-6)
+    drop, model = linearised(features, projectile, ErrorBudget(heights=False, numerical=0.0))
+    clock = (model.mean_time(Instrument()) - model.start.contact_time) / 2e-3
+    assert np.all(drop.numerical.size[clock < 1.0] == 0.0) and clock.max() > 1.2
+    back = 1e-3 * 0.2 * np.maximum(clock - 1.0, 0.0)
+    assert drop.numerical.size == pytest.approx(0.08 * back, abs=1e-8)
+    assert drop.numerical.fraction == pytest.approx(np.maximum(clock, 0.0))
 
 
 def test_globals_of_which_the_data_say_nothing_are_an_extrapolation():
