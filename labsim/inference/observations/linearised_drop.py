@@ -46,7 +46,7 @@ class ErrorBudget:
     # by more (docs/error-budget.md)
     numerical_strength: float = 0.04
     other_codes: float = 0.045
-    # of ln p_m, of each drop alone: about a smooth curve in depth over tip radius drops of two codes scatter by 0.44 % of the depth
+    # of ln p_m, of each drop alone: about a smooth curve in depth over tip radius two codes scatter by 0.44 % of the depth
     numerical_drop: float = 0.015
     # of what a cause of the material changes ln p_m by: what another code asks for beside it
     change_of_strength: float = 0.4
