@@ -193,6 +193,12 @@ class AccelerationModel:
         size = np.hypot(shares[0] * np.maximum(self.data, 0.0), FORCE_SHAPE * self._scale)
         return self._share_inside(clock) * size, SHAPE_LENGTH, FORCE_REACH
 
+    def measure_way_back(
+        self, here: FloatArray, clock: FloatArray, features: FloatArray, instrument: Instrument
+    ) -> FloatArray:
+        """Nothing: a record is compared up to the stop."""
+        return np.zeros(self.data.size)
+
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return self.observed.time
 

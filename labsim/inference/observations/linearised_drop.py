@@ -39,6 +39,7 @@ class ErrorBudget:
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.005  # of the depth, smooth
     numerical_rebound: float = 0.08  # of the way back up after the stop, smooth
+    rebound_drop: float = 0.15  # of the same, of each drop alone: two codes scatter by that
     numerical_change: float = 0.03  # of what an effect changes of a depth or of a push's resistance, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
@@ -143,11 +144,13 @@ def linearise_drop(
                 model.predict(moved, point.instruments[name], instant) - here
             ) / point.step
 
+    clock = model.mean_time(instrument) - instant.contact_time
     own_errors = model.own_errors
     own_strength = by_strength * max(math.hypot(budget.scatter, budget.numerical_drop), LEAST_SCATTER)
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
+    columns.append(model.measure_way_back(here, clock, features, instrument) * budget.rebound_drop)
     local = np.column_stack([*columns, own_errors[:, 1:]])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
@@ -159,7 +162,6 @@ def linearise_drop(
     # two codes part slowly from shallow to deep drops: the one is too deep at one end, too shallow at the other. Depth counts in
     # tip radii, thus in spacings: with it, drops of all sizes, speeds and hidden effects lie on one curve, with speed they do not
     reach = float(features[0]) - math.log(model.radius)
-    clock = model.mean_time(instrument) - instant.contact_time
     shared = {
         **model.share(here, differ, (budget.pixel_scale, budget.frame_scale, budget.contact_offset)),
         "numerical slope": model.slope(features, instrument, instant, here)
@@ -168,7 +170,9 @@ def linearise_drop(
         "numerical strength": by_strength * budget.numerical_strength,
     }
     projectile = observed.drop.projectile
-    if projectile.mass_sigma > 0.0:  # drops whose projectiles are described alike are of one projectile, weighed once
+    if (
+        projectile.mass_sigma > 0.0
+    ):  # drops whose projectiles are described alike are of one projectile, weighed once
         weighed = MASS_TO_STRENGTH * projectile.mass_sigma / projectile.mass
         shared[f"mass of {projectile}"] = by_strength * weighed
     for setting, (amplitude, sigma) in model.numerics.items():

@@ -152,6 +152,12 @@ class PushModel:
         """What the solver is off by in all such pushes alike: the same at all depths."""
         return np.full(self.data.size, shares[0]), 1.0, REACH
 
+    def measure_way_back(
+        self, here: FloatArray, clock: FloatArray, features: FloatArray, instrument: Instrument
+    ) -> FloatArray:
+        """Nothing: a push never comes back."""
+        return np.zeros(self.data.size)
+
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return np.zeros(self.data.size)
 
