@@ -279,6 +279,8 @@ def test_the_way_back_up_has_an_error_of_its_own():
     back = 1e-3 * 0.2 * np.maximum(clock - 1.0, 0.0)
     assert drop.numerical.size == pytest.approx(0.08 * back, abs=1e-8)
     assert drop.numerical.fraction == pytest.approx(np.maximum(clock, 0.0))
+    # and one of each drop alone
+    assert drop.local[:, -1] == pytest.approx(0.15 * back, abs=1e-8)
 
 
 def test_globals_of_which_the_data_say_nothing_are_an_extrapolation():

@@ -39,7 +39,7 @@ class ErrorBudget:
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.005  # of the depth, smooth
     numerical_rebound: float = 0.08  # of the way back up after the stop, smooth
-    rebound_drop: float = 0.15  # of the same, of each drop alone: two codes scatter by that
+    rebound_drop: float = 0.15  # of the same, of each drop alone (benchmarks/accuracy/way_back.py)
     numerical_change: float = 0.03  # of what an effect changes of a depth or of a push's resistance, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
