@@ -27,7 +27,6 @@ from benchmarks.seed.study import (
     name_together,
     speed_at,
 )
-from labsim.diagnosis.next_experiment import expected_information
 
 Row = dict[str, str]
 DROPS = tuple((radius, speed_at(momentum, radius)) for radius in (SMALL, LARGE) for momentum in MOMENTA)
@@ -472,12 +471,23 @@ NEXT = {
 LONELY = ("trigger_offset", "contact_offset", "surface_offset")  # act on what is read, not on the drop
 
 
+def expected_information(means: np.ndarray, spread: np.ndarray, weight: np.ndarray) -> float:
+    """Bits that a measurement is expected to tell, from below.
+
+    means : (hypotheses, values) predictions; spread : (values, values) covariance of the measurement; weight :
+    (hypotheses,) probabilities. Source: Kolchinsky & Tracey (2017), Entropy 19, 361: -Σ p_j ln Σ p_k exp(-D²_jk/8).
+    """
+    difference = means[:, None, :] - means[None, :, :]
+    distance = np.einsum("jki,il,jkl->jk", difference, np.linalg.inv(spread), difference)
+    return -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
+
+
 def list_information(study: Study) -> list[tuple[str, float, str]]:
     """Further measurement, expected information (bits), and what hypotheses predict of it.
 
     For hypotheses without a length or time of their own in the dust, a drop at the speed of the other size is that drop,
     scaled. Weights are exp(-χ²/2) with χ² over the best's reduced one, since not even the best fits; bits are the lower
-    bound that labsim's next_experiment uses.
+    bound of ``expected_information``.
     """
     brings = {
         "gravity",

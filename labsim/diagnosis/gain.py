@@ -73,17 +73,7 @@ def _hold_out(
     linear = fit.drops
     names = [] if known else ["ln_p_m", *fit.hypothesis]
     design = _stack(linear.tangents, names, linear.residual.size)
-    precision = np.zeros((len(names), len(names)))
-    pull = np.zeros(len(names))
-    for k, name in enumerate(names[1:], start=1):
-        width, _ = problem.effects[name].amplitudes[0].stand_in(fit.values[name])
-        precision[k, k] = 1 / width**2
-        pull[k] = -fit.values[name] / width**2
-    for block in fit.blocks[1:]:  # only drops are held out
-        columns = _stack(block.tangents, names, block.residual.size)
-        solved = block.solve(columns)
-        precision += columns.T @ solved
-        pull += solved.T @ block.residual
+    pull, precision = weigh_globals(problem, fit, names)
     drops = []
     models = {model.observed.name: model for model in problem.tracks.models}
     for records in groups:
@@ -102,6 +92,22 @@ def _hold_out(
         lengths = block_diag(*(models[n].lengths[np.ix_(models[n].held, models[n].held)] for n in records))
         drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread, lengths))
     return drops, pull, precision
+
+
+def weigh_globals(problem: Problem, fit: Fit, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """What priors and all data but drops say of ln p_m and of effects, about a fit: pull (k,) and precision (k, k)."""
+    precision = np.zeros((len(names), len(names)))
+    pull = np.zeros(len(names))
+    for k, name in enumerate(names[1:], start=1):
+        width, _ = problem.effects[name].amplitudes[0].stand_in(fit.values[name])
+        precision[k, k] = 1 / width**2
+        pull[k] = -fit.values[name] / width**2
+    for block in fit.blocks[1:]:
+        columns = _stack(block.tangents, names, block.residual.size)
+        solved = block.solve(columns)
+        precision += columns.T @ solved
+        pull += solved.T @ block.residual
+    return pull, precision
 
 
 def hold_out_folds(problem: Problem, fit: Fit) -> HeldOut:

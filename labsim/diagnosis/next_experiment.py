@@ -1,41 +1,54 @@
 """Which further measurement would best tell the remaining causes apart: expected information, in bits.
 
-Each hypothesis still standing predicts every candidate; candidates are drops of the groups at speeds on the grid, repeats
-included. The expected information is bounded below by Kolchinsky & Tracey (2017), Entropy 19, 361, for Gaussians of equal
-covariance: -Σ p_j ln Σ p_k exp(-D²_jk/8).
+Each hypothesis still standing predicts every candidate, given today's data: further drops of the projectiles at hand, drops of a
+heavier and of a larger one (planned_drops.py), further pushes. What is expected of a measurement is the weight of evidence that
+it gives the true hypothesis against all others, Σ p_j ln [p(y|j) / Σ_k w_k p(y|k)], w_k = p_k / (1 - p_j) (Good 1950): it goes
+on growing where all is decided. From below, with the Kullback-Leibler divergences D_jk of normal distributions:
+-Σ p_j ln Σ_k w_k exp(-D_jk) (Hershey & Olsen 2007).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import logsumexp
 
 from ..calibrated import read_value
-from ..inference.emulation.curves import FRACTIONS
+from ..errors import ExtrapolationError
 from ..inference.fits.fitting import Fit
-from ..inference.observations.observe import ObservedDrop
 from ..inference.problem import Problem
-from ..records import STANDARD_GRAVITY, FloatArray
+from ..records import FloatArray
+from .planned_drops import plan_drops, predict_planned
 
-USUAL_SIGMA = 2e-6  # m, of a camera where no drop had one
 SEEN_BY_SPEED = (
     0.01  # of ln resistance, between the slowest and the fastest push: less is no cause that speed shows
 )
 DECIDED = 4.0  # standard deviations between two predictions that are told apart
 WORTHWHILE = 0.01  # bits below which an experiment is not suggested
 SMALLEST = 0.005  # probability below which a hypothesis is left out
-POINTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])  # fractions of the stop that are compared
+MOST = 5  # experiments that are suggested
+CERTAIN = 0.95  # probability of the first from which no other projectile is asked for
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """change : what to do. tells : the causes that it is to tell apart, where it was made for two of them."""
+    """change : what to do. tells : the causes that it is to tell apart, where it was made for two of them. predictions : what
+    each cause predicts, the most probable first: its name, depth and its error (m), stopping time (s)."""
 
     change: str
     information_bits: float
     tells: tuple[tuple[str, ...], tuple[str, ...]] | None = None
+    predictions: tuple[tuple[str, float, float, float], ...] = ()
+
+    @property
+    def bits(self) -> str:
+        """The information in words."""
+        said = self.information_bits
+        return f"{said:.0f} bits" if said >= 10.0 else f"{said:.2g} bits"
 
     @property
     def text(self) -> str:
@@ -60,23 +73,39 @@ def suggest(
         return found
     weight = np.array([probabilities[fit.hypothesis or ("none",)] for fit in standing])
     weight /= weight.sum()
-    for number, group in enumerate(problem.groups):
-        if group.is_scan or group.pushed:
-            continue
-        for speed in group.speeds[1:]:
-            means = np.stack([_predict(problem, fit, number, speed) for fit in standing])
-            spread = _spread(problem, standing, number, speed, means.mean(axis=0))
-            bits = expected_information(means, spread, weight)
-            p = group.projectile
-            found.append(
-                Suggestion(
-                    f"one more drop with the {2e3 * p.tip_radius:.3g} mm tip of {p.mass * 1e6:.3g} mg at {speed:.2f} m/s "
-                    f"(height {speed**2 / 2 / STANDARD_GRAVITY * 1e3:.1f} mm)",
-                    round(bits, 3),
-                )
-            )
+    if any(not (group.is_scan or group.pushed) for group in problem.groups):
+        found += _suggest_drops(problem, standing, weight)
     worth = [each for each in found if each.information_bits >= WORTHWHILE]
-    return sorted(worth, key=lambda each: -each.information_bits)[:5]
+    return sorted(worth, key=lambda each: -each.information_bits)[:MOST]
+
+
+def _suggest_drops(problem: Problem, standing: list[Fit], weight: FloatArray) -> list[Suggestion]:
+    order = np.argsort(-weight, kind="stable")
+    first = standing[order[0]]
+    for others in (True, False) if weight.max() < CERTAIN else (False,):
+        try:
+            extended, planned = plan_drops(problem, first, other_projectiles=others)
+            by_fit = [predict_planned(problem, extended, fit) for fit in standing]
+            break
+        except ExtrapolationError:  # no run of the other projectiles comes to rest
+            if not others:
+                raise
+    found = []
+    for (text, _), predictions in zip(planned, zip(*by_fit, strict=True), strict=True):
+        bits = expected_weight(
+            [each.mean for each in predictions], [each.spread for each in predictions], weight
+        )
+        said = tuple(
+            (
+                " + ".join(standing[k].hypothesis) or "none",
+                predictions[k].depth,
+                predictions[k].depth_sigma,
+                predictions[k].stop,
+            )
+            for k in order
+        )
+        found.append(Suggestion(text, round(bits, 3), predictions=said))
+    return found
 
 
 def _suggest_pushes(
@@ -126,7 +155,8 @@ def _suggest_pushes(
     count = max(1, math.ceil(2.0 * (DECIDED * problem.budget.scatter / apart[rival]) ** 2))
     best = int(np.argmax(weights))
     spread = np.array([[2.0 * problem.budget.scatter**2 / count]])
-    bits = expected_information(np.array(ratios)[:, None], spread, np.array(weights) / sum(weights))
+    means = list(np.array(ratios)[:, None])
+    bits = expected_weight(means, [spread] * len(means), np.array(weights) / sum(weights))
     return [
         Suggestion(
             f"{count} more push{'es' * (count > 1)} at {1e3 * slow:g} mm/s and as many at {1e3 * fast:g} mm/s, near each other",
@@ -136,39 +166,27 @@ def _suggest_pushes(
     ]
 
 
-def expected_information(means: FloatArray, spread: FloatArray, weight: FloatArray) -> float:
-    """Bits that a measurement is expected to tell, from below.
+def expected_weight(means: Sequence[FloatArray], spreads: Sequence[FloatArray], weight: FloatArray) -> float:
+    """Bits of evidence that a measurement is expected to give the truth against all other hypotheses, from below.
 
-    means : (hypotheses, values) predictions; spread : (values, values) covariance of the measurement; weight :
-    (hypotheses,) probabilities. Source: Kolchinsky & Tracey (2017), as above.
+    means : (values,) of each hypothesis; spreads : (values, values) of each; weight : (hypotheses,) probabilities, of which each
+    is less than one. Source: as above.
     """
-    difference = means[:, None, :] - means[None, :, :]
-    distance = np.einsum("jki,il,jkl->jk", difference, np.linalg.inv(spread), difference)
-    return -float(weight @ np.log(np.exp(-distance / 8) @ weight)) / math.log(2)
-
-
-def _predict(problem: Problem, fit: Fit, number: int, speed: float, shift: float = 0.0) -> FloatArray:
-    """Depths (m) on the stated scale at fractions of the stop that the fit itself predicts, and the stop (as a length, m).
-
-    shift : of ln p_m from the fit's.
-    """
-    features = problem.tracks.features[number].table.features(
-        fit.log_p_m + shift, math.log(speed), fit.values
-    )
-    instrument = next(iter(problem.instruments(fit.values).values()))
-    depth, stop = math.exp(features[0]), math.exp(features[1])
-    shape = np.interp(POINTS, FRACTIONS, features[2:])
-    return np.append(depth * shape / instrument.pixel_factor, stop * instrument.rate_factor * speed)
-
-
-def _spread(problem: Problem, fits: list[Fit], number: int, speed: float, mean: FloatArray) -> FloatArray:
-    """Covariance of such a measurement: localisation, sample scatter, numerical error, uncertainty of p_m."""
-    base, moved = (_predict(problem, fits[0], number, speed, shift) for shift in (0.0, 0.01))
-    tangent = (moved - base) / 0.01
-    cameras = [drop.sigma for drop in problem.drops if isinstance(drop, ObservedDrop)]
-    white = np.median(cameras) if cameras else USUAL_SIGMA
-    variance = problem.budget.scatter**2 + fits[0].covariance[0, 0]
-    numerical = problem.budget.numerical * mean
-    return (
-        white**2 * np.eye(len(mean)) + variance * np.outer(tangent, tangent) + np.outer(numerical, numerical)
-    )
+    factors = [cho_factor(spread, lower=True) for spread in spreads]
+    determinants = [2.0 * float(np.sum(np.log(np.diag(factor[0])))) for factor in factors]
+    total = 0.0
+    for j, (mean, spread) in enumerate(zip(means, spreads, strict=True)):
+        apart = []
+        for k, factor in enumerate(factors):
+            if k != j:
+                off = mean - means[k]
+                divergence = 0.5 * (
+                    float(np.trace(cho_solve(factor, spread)))
+                    + float(off @ cho_solve(factor, off))
+                    - off.size
+                    + determinants[k]
+                    - determinants[j]
+                )
+                apart.append(math.log(weight[k] / (1.0 - weight[j])) - max(divergence, 0.0))
+        total -= float(weight[j] * logsumexp(apart))
+    return total / math.log(2)

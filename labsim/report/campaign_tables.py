@@ -13,6 +13,7 @@ import numpy as np
 from ..calibrated import find_parameter, show_parameter
 from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
+from ..diagnosis.judge import MOST_NAMED
 from ..diagnosis.misfit import say_misfit
 from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
@@ -217,7 +218,20 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
             ],
         },
         "next_experiment": [
-            {"change": each.text, "information_bits": each.information_bits} for each in suggestions
+            {
+                "change": each.text,
+                "information_bits": each.information_bits,
+                "predictions": [
+                    {
+                        "cause": cause,
+                        "depth_mm": depth * 1e3,
+                        "depth_sd_mm": sigma * 1e3,
+                        "stopping_time_ms": stop * 1e3,
+                    }
+                    for cause, depth, sigma, stop in each.predictions
+                ],
+            }
+            for each in suggestions
         ],
         "numerical_error": state_numerical_error(found.problem),
         "scatter": found.scatter.summarise(),
@@ -369,7 +383,11 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
     lines += [f"  {text}" for text in say_learned(found)]
     lines += _say_untestable(found)
     if suggestions:
-        lines.append(f"  next experiment: {suggestions[0].text} ({suggestions[0].information_bits:.2f} bits)")
+        lines.append(f"  next experiment: {suggestions[0].text} ({suggestions[0].bits})")
+        lines += [
+            f"    {cause} expects {depth * 1e3:.3f} ± {sigma * 1e3:.3f} mm in {stop * 1e3:.2f} ms"
+            for cause, depth, sigma, stop in suggestions[0].predictions[:MOST_NAMED]
+        ]
     lines.append(f"  {found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s")
     return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings[found.doubts :])])
 

@@ -1,34 +1,141 @@
-"""Expected information against cases that are known."""
+"""Drops that nobody has made: their predictions against runs and against another algebra, their evidence against closed forms."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from labsim.diagnosis.next_experiment import expected_information
+from labsim.campaign import read_campaign
+from labsim.diagnosis.next_experiment import expected_weight, suggest
+from labsim.diagnosis.planned_drops import HEAVIER, LARGER, plan_drops, predict_planned
+from labsim.effects import list_effects
+from labsim.inference.fits.fitting import Fit, fit_hypothesis
+from labsim.inference.fits.tangents import linearise_at
+from labsim.inference.observations.observe import observe_drops
+from labsim.inference.open_problem import open_problem
+from labsim.inference.problem import Problem
+from labsim.runs.store import RunStore
+from labsim.sph import simulate
 
+CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")
 EVEN = np.array([0.5, 0.5])
 
 
-@pytest.mark.parametrize(("apart", "bits"), [(0.0, 0.0), (50.0, 1.0)])
-def test_two_hypotheses_that_predict_the_same_or_far_apart(apart: float, bits: float) -> None:
-    means = np.array([[0.0, 0.0], [apart, 0.0]])
-    assert expected_information(means, np.eye(2), EVEN) == pytest.approx(bits, abs=1e-9)
+@pytest.fixture(scope="module")
+def fitted(shared_store) -> tuple[Problem, Fit, Fit]:
+    drops = tuple(drop for drop in CAMPAIGN.drops if drop.name in ("D01", "D02", "D03", "D05", "D06", "D07"))
+    campaign = replace(CAMPAIGN, drops=drops, scans=())
+    chosen = {name: list_effects(campaign)[name] for name in ("pixel_scale", "side_friction")}
+    problem = open_problem(
+        campaign, RunStore(shared_store), chosen, workers=1, drops=observe_drops(campaign)[0], cells=4
+    )
+    nominal = fit_hypothesis(problem, (), (math.log(1300.0), {}))
+    begin = nominal.log_p_m, {"side_friction": 0.3}
+    return problem, nominal, fit_hypothesis(problem, ("side_friction",), begin)
 
 
-def test_never_more_than_the_measurement_can_tell() -> None:
-    """Two Gaussians 2 standard deviations apart: the information by integration, of which the bound lies below."""
-    x = np.linspace(-9.0, 11.0, 20001)
-    each = [np.exp(-((x - m) ** 2) / 2) / np.sqrt(2 * np.pi) for m in (0.0, 2.0)]
-    whole = 0.5 * (each[0] + each[1])
-    true = sum(0.5 * np.trapezoid(p * np.log2(np.maximum(p, 1e-300) / whole), x) for p in each)
-    bound = expected_information(np.array([[0.0], [2.0]]), np.eye(1), EVEN)
-    assert 0.5 * true < bound < true
+@pytest.fixture(scope="module")
+def planned(fitted):
+    problem, nominal, friction = fitted
+    before = {name: len(table) for name, table in list_tables(problem)}
+    extended, drops = plan_drops(problem, nominal, other_projectiles=True)
+    predictions = [predict_planned(problem, extended, fit) for fit in (nominal, friction)]
+    assert {name: len(table) for name, table in list_tables(problem)} == before
+    assert len(problem.tracks.models) == 6 and len(problem.places) == 6 and len(problem.campaign.drops) == 6
+    return extended, drops, predictions
 
 
-def test_a_correlated_error_is_counted_once() -> None:
-    """What moves both values together tells nothing where only the difference differs less than its error."""
-    spread = np.array([[1.0, 0.999], [0.999, 1.0]])
-    along = expected_information(np.array([[0.0, 0.0], [1.0, 1.0]]), spread, EVEN)
-    across = expected_information(np.array([[0.0, 0.0], [1.0, -1.0]]), spread, EVEN)
-    assert along < 0.2 and across > 0.99
+def list_tables(problem: Problem):
+    for number, each in enumerate(problem.features):
+        yield f"base {number}", each.table.base
+        yield f"changes {number}", each.table.changes.get("side_friction", {})
+
+
+def test_every_planned_drop_goes_as_deep_as_a_run_of_it(fitted, planned) -> None:
+    problem, nominal, _ = fitted
+    extended, drops, (predictions, _) = planned
+    (usual,) = problem.groups
+    radii = [model.radius for _, model in drops]
+    assert len(drops) == len(usual.speeds) - 1 + 2 and max(radii) == LARGER * usual.projectile.tip_radius
+    masses = [model.observed.drop.projectile.mass for _, model in drops]
+    assert sorted({round(mass / usual.projectile.mass) for mass in masses}) == [1, HEAVIER, LARGER**3]
+    for k in (0, len(drops) - 2, len(drops) - 1):
+        text, model = drops[k]
+        number = next(n for n, each in enumerate(extended.features) if each.table is model.table)
+        speed = math.exp(model.start.log_speed)
+        assert f"{speed:.2f} m/s" in text
+        setting = extended.grid.setting(extended.groups[number], speed, math.exp(nominal.log_p_m))
+        run = simulate(setting)
+        # drops so far correct the simulation, within twice its errors of contact and of depth
+        corrected = 0.03 * model.radius + 0.02 * run.penetration_depth
+        assert predictions[k].depth == pytest.approx(run.penetration_depth, abs=corrected)
+        assert predictions[k].stop == pytest.approx(run.stopping_time, rel=0.02)
+        assert 0.002 < predictions[k].depth_sigma / predictions[k].depth < 0.05
+
+
+def test_a_prediction_is_the_normal_distribution_given_today_s_data(fitted, planned) -> None:
+    """Globals as one more normal error each, and the joint covariance inverted as a whole."""
+    problem, _, friction = fitted
+    extended, _, (_, predictions) = planned
+    starts = [model.start for model in extended.tracks.models[6:]]
+    nuisances = np.vstack([friction.nuisances[0], np.array(starts)])
+    (linear,) = linearise_at(extended, (nuisances,), friction.log_p_m, friction.values)
+    parameter = problem.effects["side_friction"].amplitudes[0]
+    width, _ = parameter.stand_in(friction.values["side_friction"])
+    widths = {"ln_p_m": 30.0, "side_friction": width}
+    joint = linear.covariance + sum(
+        each**2 * np.outer(linear.tangents[name], linear.tangents[name]) for name, each in widths.items()
+    )
+    first = linear.sections[extended.tracks.models[6].observed.name]
+    seen = np.arange(len(joint)) < first.start
+    weights = np.linalg.solve(joint[np.ix_(seen, seen)], joint[seen][:, first]).T
+    # the prior of the effect is about its null, not about the fit
+    away = -friction.values["side_friction"]
+    residual = linear.residual - linear.tangents["side_friction"] * away
+    mean = weights @ residual[seen] - residual[first]
+    spread = joint[first, first] - weights @ joint[seen][:, first]
+    scale = predictions[0].depth
+    assert predictions[0].mean == pytest.approx(mean, abs=2e-4 * scale)
+    assert np.sqrt(np.diag(predictions[0].spread)) == pytest.approx(np.sqrt(np.diag(spread)), rel=0.01)
+
+
+def test_suggestions_say_what_each_cause_predicts(fitted) -> None:
+    problem, nominal, friction = fitted
+    found = suggest(problem, [nominal, friction], {("none",): 0.4, ("side_friction",): 0.6})
+    assert found and found[0].information_bits == max(each.information_bits for each in found)
+    names, depths, sigmas, stops = zip(*found[0].predictions, strict=True)
+    assert names == ("side_friction", "none")
+    assert all(0.0 < sigma < 0.1 * depth for depth, sigma in zip(depths, sigmas, strict=True))
+    assert all(5e-4 < stop < 2e-2 for stop in stops)
+    # where the first is certain no other projectile is asked for
+    sure = suggest(problem, [nominal, friction], {("none",): 0.02, ("side_friction",): 0.98})
+    assert not any("another projectile" in each.change for each in sure)
+    assert suggest(problem, [nominal], {("none",): 1.0}) == []
+
+
+@pytest.mark.parametrize("apart", [0.0, 2.0, 50.0])
+def test_evidence_goes_on_growing_where_all_is_decided(apart: float) -> None:
+    """Of two normal distributions alike: half of their squared distance."""
+    means = [np.zeros(2), np.array([apart, 0.0])]
+    found = expected_weight(means, [np.eye(2)] * 2, EVEN)
+    assert found == pytest.approx(0.5 * apart**2 / math.log(2), abs=1e-12)
+
+
+def test_evidence_of_two_spreads_is_their_divergence() -> None:
+    wide, narrow = np.array([[4.0]]), np.array([[1.0]])
+    # ∫ p ln(p/q), of N(0, 4) from N(0, 1) and the other way round
+    from_narrow, from_wide = 0.5 * (4.0 - 1.0 - math.log(4.0)), 0.5 * (0.25 - 1.0 + math.log(4.0))
+    found = expected_weight([np.zeros(1)] * 2, [wide, narrow], np.array([0.3, 0.7]))
+    assert found == pytest.approx((0.3 * from_narrow + 0.7 * from_wide) / math.log(2))
+
+
+def test_a_third_hypothesis_that_predicts_the_same_leaves_little_to_tell() -> None:
+    means = [np.zeros(1), np.zeros(1), np.array([9.0])]
+    found = expected_weight(means, [np.eye(1)] * 3, np.array([0.45, 0.45, 0.1]))
+    # the twins cannot be told apart, the third can from both
+    alike = -math.log(0.45 / 0.55 + 0.1 / 0.55 * math.exp(-40.5))
+    assert found == pytest.approx((0.9 * alike + 0.1 * 40.5) / math.log(2))

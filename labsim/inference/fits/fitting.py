@@ -176,6 +176,11 @@ def with_perturbations(
     return linearise_at(problem, fit.nuisances, place, fit.values, names)
 
 
+def require_runs(problem: Problem, fit: Fit) -> None:
+    """Make sure that a problem has the runs that a fit, perhaps to another problem with the same effects, rests on."""
+    _ask(problem, fit.hypothesis, fit.log_p_m, fit.values, sparse=False, around=False)
+
+
 def _ask(
     problem: Problem,
     hypothesis: Hypothesis,

@@ -63,6 +63,25 @@ class ObservedDrop:
         return self.drop.camera.pixel_size
 
 
+@dataclass(frozen=True)
+class PlannedDrop:
+    """A drop that may be filmed: times of rows (n,) s, their error (m), and noughts in place of depths."""
+
+    drop: Drop
+    time: FloatArray
+    depth: FloatArray
+    sigma: float
+
+    @property
+    def name(self) -> str:
+        return self.drop.name
+
+    @property
+    def pixel(self) -> float:
+        assert self.drop.camera is not None
+        return self.drop.camera.pixel_size
+
+
 Observed = ObservedDrop | ObservedImpact | ObservedPush  # what one instrument recorded of one drop or push
 
 

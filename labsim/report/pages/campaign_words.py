@@ -9,7 +9,7 @@ import numpy as np
 
 from ...inference.fits.fitting import Fit
 from ...inference.fits.posterior import Posterior
-from ...inference.observations.observe import Observed, ObservedDrop
+from ...inference.observations.observe import Observed, ObservedDrop, PlannedDrop
 from ...inference.observations.observe_acceleration import ObservedImpact
 from ...inference.observations.observe_push import ObservedPush
 from ...inference.problem import Problem
@@ -51,7 +51,7 @@ def describe_measurement(campaign: Campaign, problem: Problem, views: Sequence[D
                 "rate": show_number(rate, "{:g}"),
                 "pixel": show_number(pixel * 1e6 if pixel else None, "{:g}"),
                 "used": sum(each.time.size for each in observed if not isinstance(each, ObservedPush)),
-                "rejected": sum(each.rejected for each in observed),
+                "rejected": sum(each.rejected for each in observed if not isinstance(each, PlannedDrop)),
             }
         )
     return {"words": words, "projectiles": rows, "left_out": "; ".join(_left_out(campaign.drops, drops))}
