@@ -247,27 +247,6 @@ def linearised(features, projectile, budget):
     return linearise_drop(model, model.start, math.log(1000.0), here, budget, {}), model
 
 
-def test_drops_of_one_projectile_share_the_error_of_its_mass():
-    budget = ErrorBudget(heights=False)
-    known, weighed = (Projectile("hemisphere", 5e-4, 1.33e-6, mass_sigma=sigma) for sigma in (0.0, 6.65e-9))
-    errors = {
-        name: linearised(sine_features(), projectile, budget)[0]
-        for name, projectile in (
-            ("known", known),
-            ("one", weighed),
-            ("again", weighed),
-            ("heavier", replace(weighed, mass=2e-6)),
-        )
-    }
-    of_mass = {name: {key for key in drop.shared if "mass" in key} for name, drop in errors.items()}
-    assert not of_mass["known"] and len(of_mass["one"]) == 1
-    assert of_mass["one"] == of_mass["again"] != of_mass["heavier"]
-    (key,) = of_mass["one"]
-    # depth goes as m^0.9 where it goes as p_m^-0.3
-    assert errors["one"].shared[key] == pytest.approx(3.0 * 0.005 * errors["one"].tangents["ln_p_m"])
-    assert errors["one"].local == pytest.approx(errors["known"].local)
-
-
 def test_the_way_back_up_has_an_error_of_its_own():
     features = sine_features()
     after = np.maximum(FRACTIONS - 1.0, 0.0)
