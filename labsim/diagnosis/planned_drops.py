@@ -30,7 +30,7 @@ from .gain import weigh_globals
 USUAL_SIGMA, USUAL_PIXEL = 2e-6, 1e-5  # m, of a camera where no drop had one
 USUAL_FRAMES = 40.0  # of it, up to the stop
 FALL, DUST = 6, 24  # rows that stand for all frames before contact, one stopping time long, and after it
-END = 1.3  # of the stopping time
+END = 1.05  # of the stopping time: films are compared up to the stop
 HEAVIER, LARGER = 3.0, 2.0  # than the usual projectile, in mass and in radius
 ALIKE = 1.3  # factor in radius, or in mass over its cube, within which a projectile is there already
 

@@ -31,9 +31,8 @@ def parameters(campaign):
 
 
 leaves = (
-    "The way back up after the stop, which grows nearly as 1/√K0 and which nothing else changes as much, and a wide halo of "
-    "slightly compacted dust where K0 is small; the depth grows by a few percent for a ten times smaller K0, almost like a "
-    "smaller p_m."
+    "Rebound and ringing after the stop, and a wide halo of slightly compacted dust where K0 is small; the depth grows by a "
+    "few percent for a ten times smaller K0, almost like a smaller p_m."
 )
 references = (
     "Güttler, Krause, Geretshauser, Speith & Blum (2009b)",

@@ -1,8 +1,8 @@
 """From a handful of runs of one drop to its depth curve anywhere near them.
 
-The features of a run are (ln D, ln T_s, s(τ)): depth over D at fixed fractions τ of the stopping time, to a third of it beyond
-the stop, where the dust springs back. These are smooth in every parameter even where the curve itself is not (its kink moves
-with the stop), so low polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.md gives the measured error.
+The features of a run are (ln D, ln T_s, s(τ)): depth over D at fixed fractions τ of the stopping time, to a little beyond the
+stop. These are smooth in every parameter even where the curve itself is not (its kink moves with the stop), so low
+polynomials in (ln p_m, ln v0, effect amplitude) carry them; docs/error-budget.md gives the measured error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...sph import DropRun
 from ...sph.profile import is_blunt
 from ...sph.tips import make_profile
 
-FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.35, 14)])
+FRACTIONS = np.concatenate([np.linspace(0.0, 1.0, 41), np.linspace(1.025, 1.15, 6)])
 # a cubic spline is linear in its values, and all curves have theirs at FRACTIONS: (4, pieces, values)
 UNIT_SPLINES = np.ascontiguousarray(CubicSpline(FRACTIONS, np.eye(FRACTIONS.size)).c)
 PIECES = 4  # of the spline through the speed up to the stop

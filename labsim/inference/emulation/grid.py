@@ -35,8 +35,6 @@ SLACK = 0.25  # of one ratio, which all together may be longer: a node more for 
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, 1.3
-# of the stopping time: runs of drops go on for as long as their features do (curves.py), those of scans until the dust settles
-AFTER_STOP, SETTLING = 0.36, 0.16
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 # of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more
 # than the usual, in proportion
@@ -190,14 +188,9 @@ def _unit_spline(nodes: tuple[float, ...]) -> CubicSpline:
 
 
 def set_nominal_drop(
-    campaign: Campaign,
-    projectile: Projectile,
-    speed: float,
-    p_m: float,
-    cells: float,
-    after_stop: float = AFTER_STOP,
+    campaign: Campaign, projectile: Projectile, speed: float, p_m: float, cells: float
 ) -> DropSetting:
-    """What the campaign states, as one drop: speed m/s, p_m Pa, cells spacings in a tip radius, after_stop of T_s."""
+    """What the campaign states, as one drop: speed m/s, p_m Pa, cells spacings in a tip radius."""
     return DropSetting(
         projectile=projectile,
         impact_speed=speed,
@@ -207,7 +200,7 @@ def set_nominal_drop(
         gravity=campaign.gravity,
         geometry=campaign.geometry,
         spacing=projectile.tip_radius / cells,
-        after_stop=after_stop,
+        after_stop=0.16,
     )
 
 
@@ -275,8 +268,7 @@ class RunGrid:
             usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
         of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
-        after_stop = SETTLING if group.is_scan else AFTER_STOP
-        setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own, after_stop)
+        setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own)
         if group.pushed:
             setting = set_push(setting, speed)
         return setting if self.extension is None else self.extension(setting)

@@ -181,23 +181,12 @@ class AccelerationModel:
         return float(np.max(np.abs(self.data)))
 
     def find_solver_error(
-        self,
-        here: FloatArray,
-        clock: FloatArray,
-        features: FloatArray,
-        instrument: Instrument,
-        shares: tuple[float, float],
+        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
     ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in drops that go alike deep, m/s²; over which share of the stopping time, and over how many
         e-folds of depth over tip radius, that changes."""
-        size = np.hypot(shares[0] * np.maximum(self.data, 0.0), FORCE_SHAPE * self._scale)
+        size = np.hypot(share * np.maximum(self.data, 0.0), FORCE_SHAPE * self._scale)
         return self._share_inside(clock) * size, SHAPE_LENGTH, FORCE_REACH
-
-    def measure_way_back(
-        self, here: FloatArray, clock: FloatArray, features: FloatArray, instrument: Instrument
-    ) -> FloatArray:
-        """Nothing: a record is compared up to the stop."""
-        return np.zeros(self.data.size)
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return self.observed.time

@@ -130,25 +130,11 @@ class DropModel:
         return np.maximum(here, 0.0)
 
     def find_solver_error(
-        self,
-        here: FloatArray,
-        clock: FloatArray,
-        features: FloatArray,
-        instrument: Instrument,
-        shares: tuple[float, float],
+        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
     ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in drops that go alike deep, m; over which share of the stopping time, and over how many
-        e-folds of depth over tip radius, that changes. shares : of the depth, and of the way back up after the stop."""
-        depth = np.clip(here * instrument.pixel_factor, 0.0, math.exp(features[0])) * (clock > 0)
-        back = self.measure_way_back(here, clock, features, instrument)
-        return np.hypot(shares[0] * depth, shares[1] * back), ALONG, REACH
-
-    def measure_way_back(
-        self, here: FloatArray, clock: FloatArray, features: FloatArray, instrument: Instrument
-    ) -> FloatArray:
-        """How far the projectile has come back up after its stop, (n,) m; clock : s from contact."""
-        final, stop = np.exp(features[:2])
-        return np.where(clock > stop, np.maximum(final - here * instrument.pixel_factor, 0.0), 0.0)
+        e-folds of depth over tip radius, that changes."""
+        return share * np.clip(here * instrument.pixel_factor, 0.0, final) * (clock > 0), ALONG, REACH
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         """True times (s) of the data."""

@@ -14,7 +14,6 @@ from scipy.spatial.distance import cdist
 from ...effects import Instrument
 from ...records import STANDARD_GRAVITY, FloatArray
 from ...sph import DropSetting
-from ..emulation.curves import FRACTIONS
 from ..emulation.forward import Instant
 from .acceleration_model import AccelerationModel
 from .drop_model import ALONG, FREE, REACH, SPEED_WIDTH, DropModel
@@ -38,8 +37,6 @@ class ErrorBudget:
     frame_scale: float = 0.0002
     contact_offset: float = 0.015  # numerical offset of the contact, in tip radii, common to all drops
     numerical: float = 0.005  # of the depth, smooth
-    numerical_rebound: float = 0.08  # of the way back up after the stop, smooth
-    rebound_drop: float = 0.15  # of the same, of each drop alone (benchmarks/accuracy/way_back.py)
     numerical_change: float = 0.03  # of what an effect changes of a depth or of a push's resistance, smooth
     # of what an effect changes of the compaction: two codes differ by 14 % in what a shear factor of 0.6 adds under a bead
     zone_change: float = 0.15
@@ -142,17 +139,14 @@ def linearise_drop(
                 model.predict(moved, point.instruments[name], instant) - here
             ) / point.step
 
-    clock = model.mean_time(instrument) - instant.contact_time
+    mass = observed.drop.projectile
+    scatter = math.hypot(budget.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
     own_errors = model.own_errors
-    projectile = observed.drop.projectile
-    # a mass that every drop errs in for itself: as an error of all drops of a projectile it takes evidence from causes that are
-    # there (p08, pore_gas: 0.98 to 0.53), for it stands in for what two codes scatter by from drop to drop
-    scatter = math.hypot(budget.scatter, MASS_TO_STRENGTH * projectile.mass_sigma / projectile.mass)
     own_strength = by_strength * max(scatter, LEAST_SCATTER)
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
-    columns.append(model.measure_way_back(here, clock, features, instrument) * budget.rebound_drop)
+    final, stop = np.exp(features[0]), np.exp(features[1])
     local = np.column_stack([*columns, own_errors[:, 1:]])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
@@ -164,6 +158,7 @@ def linearise_drop(
     # two codes part slowly from shallow to deep drops: the one is too deep at one end, too shallow at the other. Depth counts in
     # tip radii, thus in spacings: with it, drops of all sizes, speeds and hidden effects lie on one curve, with speed they do not
     reach = float(features[0]) - math.log(model.radius)
+    clock = model.mean_time(instrument) - instant.contact_time
     shared = {
         **model.share(here, differ, (budget.pixel_scale, budget.frame_scale, budget.contact_offset)),
         "numerical slope": model.slope(features, instrument, instant, here)
@@ -178,18 +173,16 @@ def linearise_drop(
     if with_others:
         shared[f"strength of {observed.drop.sample}"] = own_strength
 
-    off, length, changes = model.find_solver_error(
-        here, clock, features, instrument, (budget.numerical, budget.numerical_rebound)
-    )
+    off, length, changes = model.find_solver_error(here, clock, final, instrument, budget.numerical)
     if model.changes_differ and features is not response.plain:
         change = here - model.predict(response.plain, instrument, instant)
         off = np.hypot(off, budget.numerical_change * change)
     numerical = NumericalError(
         off,
-        np.clip(clock / np.exp(features[1]), 0.0, FRACTIONS[-1]),
+        np.clip(clock / stop, 0.0, 1.0),
         reach,
         math.log(model.radius),
-        math.log(projectile.mass / model.radius**3),
+        math.log(mass.mass / model.radius**3),
         model.unit,
         length,
         changes,

@@ -22,7 +22,7 @@ from ...video.track_file import read_track
 from .observe_acceleration import ObservedImpact, observe_impact
 from .observe_push import ObservedPush, observe_push
 
-REBOUND = 0.33  # of the stopping time, for which rows count after the stop; runs go on for a little longer
+MARGIN = 4  # frames kept after the depth has stopped growing
 DUST_PARAMETERS = 3  # that the rows in the dust tell of a motion; contact and speed are those of free fall
 # Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
 SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
@@ -92,10 +92,7 @@ def _list_warnings(seen: Observed) -> tuple[str, ...]:
 
 
 def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
-    """Depths on the stated scale up to a third of the stopping time after the stop, outliers removed.
-
-    Raises MeasurementError where nothing is left.
-    """
+    """Depths on the stated scale up to the stop, outliers removed. Raises MeasurementError where nothing is left."""
     assert drop.camera is not None
     pixel = drop.camera.pixel_size
     place = drop.record.path or drop.name
@@ -114,14 +111,16 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
     time, depth = curve.clock[use], (track.tip_row[use] - drop.camera.surface_row) * pixel
     if depth.max() < 5 * sigma_px * pixel:
         raise MeasurementError(place, "tip_row_px", "never reaches the surface")
-    contact, stop = curve.contact_time.value, curve.stopping_time.value
-    if not math.isfinite(stop):
-        stop = time[np.argmax(depth)] - contact
-    kept = time <= contact + (1.0 + REBOUND) * stop
+    # where it comes to rest, from the whole record: after a rebound that is above the deepest point
+    rest = (rows - drop.camera.surface_row) * pixel
+    rest = rest[rest > 0.8 * depth.max()]
+    final = np.median(rest) if rest.size > 6 else depth.max()
+    reached = np.nonzero(depth > final - 2 * sigma_px * pixel)[0]
+    last = min(reached[0] + MARGIN, depth.size) if reached.size else depth.size
     return ObservedDrop(
         drop=drop,
-        time=time[kept],
-        depth=depth[kept],
+        time=time[:last],
+        depth=depth[:last],
         sigma=sigma_px * pixel,
         rejected=int(np.sum(good & ~curve.used & (curve.clock <= time[-1]))),
         track=track,
@@ -146,7 +145,7 @@ def judge_noise(seen: Sequence[Observed]) -> list[Observed]:
 
 
 def _scatter_in_dust(drop: ObservedDrop) -> tuple[float, int]:
-    """χ² of the rows from contact on about the motion that was fitted to them alone, and its degrees of freedom."""
+    """χ² of the rows between contact and rest about the motion that was fitted to them alone, and its degrees of freedom."""
     curve, sigma = drop.curve, float(np.median(drop.track.sigma))
     assert curve.used is not None and curve.clock is not None and curve.residual is not None
     inside = curve.used & (curve.clock > drop.contact_time) & (curve.clock <= drop.time[-1])

@@ -142,21 +142,10 @@ class PushModel:
         return np.asarray(self.ground.size * np.linalg.cholesky(alike))
 
     def find_solver_error(
-        self,
-        here: FloatArray,
-        clock: FloatArray,
-        features: FloatArray,
-        instrument: Instrument,
-        shares: tuple[float, float],
+        self, here: FloatArray, clock: FloatArray, final: float, instrument: Instrument, share: float
     ) -> tuple[FloatArray, float, float]:
         """What the solver is off by in all such pushes alike: the same at all depths."""
-        return np.full(self.data.size, shares[0]), 1.0, REACH
-
-    def measure_way_back(
-        self, here: FloatArray, clock: FloatArray, features: FloatArray, instrument: Instrument
-    ) -> FloatArray:
-        """Nothing: a push never comes back."""
-        return np.zeros(self.data.size)
+        return np.full(self.data.size, share), 1.0, REACH
 
     def mean_time(self, instrument: Instrument) -> FloatArray:
         return np.zeros(self.data.size)
