@@ -31,6 +31,7 @@ USUAL_SIGMA, USUAL_PIXEL = 2e-6, 1e-5  # m, of a camera where no drop had one
 USUAL_FRAMES = 40.0  # of it, up to the stop
 FALL, DUST = 6, 24  # rows that stand for all frames before contact, one stopping time long, and after it
 END = 1.05  # of the stopping time: films are compared up to the stop
+ROUGH = 0.003  # of the depth, by which rows of two hypotheses differ that are interpolated between other runs
 HEAVIER, LARGER = 3.0, 2.0  # than the usual projectile, in mass and in radius
 ALIKE = 1.3  # factor in radius, or in mass over its cube, within which a projectile is there already
 
@@ -83,8 +84,8 @@ def plan_drops(
         projectile = groups[number].projectile
         table = next(each.table for each in features if each.group == number)
         name = f"planned {len(models) + 1}"
-        stop = math.exp(table.features(fit.log_p_m, math.log(speed), fit.values)[1])
-        seen = _plan_film(problem, name, projectile, stop)
+        depth, stop = np.exp(table.features(fit.log_p_m, math.log(speed), fit.values)[:2])
+        seen = _plan_film(problem, name, projectile, float(depth), float(stop))
         text = (
             f"{words} the {2e3 * projectile.tip_radius:.3g} mm tip of {projectile.mass * 1e6:.3g} mg at {speed:.2f} m/s "
             f"(height {speed**2 / 2 / STANDARD_GRAVITY * 1e3:.1f} mm)"
@@ -175,8 +176,8 @@ def _list_others(problem: Problem) -> list[tuple[Projectile, float]]:
     ]
 
 
-def _plan_film(problem: Problem, name: str, projectile: Projectile, stop: float) -> PlannedDrop:
-    """A film of a drop that stops after ``stop`` (s), by the campaign's usual camera."""
+def _plan_film(problem: Problem, name: str, projectile: Projectile, depth: float, stop: float) -> PlannedDrop:
+    """A film of a drop that stops at ``depth`` (m) after ``stop`` (s), by the campaign's usual camera."""
     films = [drop for drop in problem.drops if isinstance(drop, ObservedDrop)]
     like = films[0].drop if films else problem.campaign.drops[0]
     camera = like.camera or Camera(USUAL_FRAMES / stop, USUAL_PIXEL, 0.0, 0.0)
@@ -193,4 +194,4 @@ def _plan_film(problem: Problem, name: str, projectile: Projectile, stop: float)
     )
     time = stop * np.concatenate([np.linspace(-1.0, -0.05, FALL), np.linspace(0.03, END, DUST)])
     share = max(camera.frame_rate * stop * END / DUST, 1.0)  # frames that one row stands for
-    return PlannedDrop(drop, time, np.zeros(time.size), sigma / math.sqrt(share))
+    return PlannedDrop(drop, time, np.zeros(time.size), math.hypot(sigma / math.sqrt(share), ROUGH * depth))
