@@ -43,6 +43,7 @@ from .explore import EXPLORED, explore, needs_exploration
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import NESTED, PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
+from .next_experiment import Suggestion, suggest
 from .pairs import confirm_pairs, refine_leading, return_to_singles
 from .screen import CLOSE, Score, Screening, draw_strengths, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
@@ -98,8 +99,9 @@ class Judgement:
 class Diagnosis(Judgement):
     """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa.
 
-    untestable : beside what was found; combination : what is measured although they may be there. misfit : of the nominal fit,
-    every observation, every drop and map. learned : what is missing as a formula, where nothing listed explains the data.
+    suggestions : further experiments, the best first. untestable : beside what was found; combination : what is measured although
+    they may be there. misfit : of the nominal fit, every observation, every drop and map. learned : what is missing as a formula,
+    where nothing listed explains the data.
     """
 
     confusable: list[tuple[str, str, float]]
@@ -117,6 +119,7 @@ class Diagnosis(Judgement):
     runs_new: int
     runs_reused: int
     wall: float
+    suggestions: tuple[Suggestion, ...]
     warnings: tuple[str, ...]
     doubts: int = 0  # how many of the warnings, the first ones, are about p_m itself: nobody should read it without them
 
@@ -307,6 +310,7 @@ def diagnose_campaign(
             for text in warn_of_range(problem, best) + warn_unsettled(best)
         ]
     doubts += doubt_scales(seen.drops)
+    suggestions = suggest(problem, [nominal, *found.rivals], dict(found.verdict.probabilities))
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},
         confusable=list_confusable(found.screening),
@@ -321,6 +325,7 @@ def diagnose_campaign(
         posterior_extended=extended,
         p_m_averaged=averaged,
         scatter=estimate_scatter(problem, best),
+        suggestions=tuple(suggestions),
         runs_new=store.new,
         runs_reused=store.reused,
         wall=time.perf_counter() - began,
@@ -334,8 +339,13 @@ def allow_for_codes(problem: Problem, nominal: Fit, fit: Fit) -> Fit:
     that, and p_m makes up for it (docs/error-budget.md)."""
     if not any(problem.effects[name].kind == "material" for name in fit.hypothesis):
         return fit
-    beside = problem.budget.change_of_strength * abs(fit.log_p_m - nominal.log_p_m)
-    return replace(fit, between_codes=math.hypot(problem.budget.other_codes, beside))
+    beside = spread_between_codes(problem, abs(fit.log_p_m - nominal.log_p_m))
+    return replace(fit, between_codes=float(beside))
+
+
+def spread_between_codes(problem: Problem, moved: float | FloatArray) -> FloatArray:
+    """Standard deviation of ln p_m between codes, beside a cause of the material that has moved it by so much."""
+    return np.hypot(problem.budget.other_codes, problem.budget.change_of_strength * moved)
 
 
 def draw_between_codes(
@@ -343,10 +353,9 @@ def draw_between_codes(
 ) -> FloatArray:
     """Draws (count,) of ln p_m with an effect that was only screened, as another code would say them."""
     drawn = draw_strengths(problem, screening, name, count, rng)
-    beside = 0.0
-    if problem.effects[name].kind == "material":
-        beside = problem.budget.change_of_strength * np.abs(drawn - screening.log_p_m)
-    return drawn + np.hypot(problem.budget.other_codes, beside) * rng.standard_normal(count)
+    of_material = problem.effects[name].kind == "material"
+    spread = spread_between_codes(problem, of_material * np.abs(drawn - screening.log_p_m))
+    return drawn + spread * rng.standard_normal(count)
 
 
 def check_leading(problem: Problem, leading: Fit, rng: np.random.Generator) -> float:

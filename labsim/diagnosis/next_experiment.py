@@ -22,7 +22,7 @@ from ..errors import ExtrapolationError
 from ..inference.fits.fitting import Fit
 from ..inference.problem import Problem
 from ..records import FloatArray
-from .planned_drops import plan_drops, predict_planned
+from .planned_drops import Prediction, plan_drops, predict_planned
 
 SEEN_BY_SPEED = (
     0.01  # of ln resistance, between the slowest and the fastest push: less is no cause that speed shows
@@ -37,12 +37,12 @@ CERTAIN = 0.95  # probability of the first from which no other projectile is ask
 @dataclass(frozen=True)
 class Suggestion:
     """change : what to do. tells : the causes that it is to tell apart, where it was made for two of them. predictions : what
-    each cause predicts, the most probable first: its name, depth and its error (m), stopping time (s)."""
+    each cause predicts, the most probable first, by its name."""
 
     change: str
     information_bits: float
     tells: tuple[tuple[str, ...], tuple[str, ...]] | None = None
-    predictions: tuple[tuple[str, float, float, float], ...] = ()
+    predictions: tuple[tuple[str, Prediction], ...] = ()
 
     @property
     def bits(self) -> str:
@@ -95,15 +95,7 @@ def _suggest_drops(problem: Problem, standing: list[Fit], weight: FloatArray) ->
         bits = expected_weight(
             [each.mean for each in predictions], [each.spread for each in predictions], weight
         )
-        said = tuple(
-            (
-                " + ".join(standing[k].hypothesis) or "none",
-                predictions[k].depth,
-                predictions[k].depth_sigma,
-                predictions[k].stop,
-            )
-            for k in order
-        )
+        said = tuple((" + ".join(standing[k].hypothesis) or "none", predictions[k]) for k in order)
         found.append(Suggestion(text, round(bits, 3), predictions=said))
     return found
 

@@ -22,7 +22,7 @@ from ..inference.fits.fitting import Fit, require_runs
 from ..inference.fits.tangents import linearise_at
 from ..inference.observations import RunFeatures
 from ..inference.observations.drop_model import DropModel
-from ..inference.observations.observe import ObservedDrop, PlannedDrop
+from ..inference.observations.observe import FilmedDrop, ObservedDrop
 from ..inference.problem import Problem
 from ..records import STANDARD_GRAVITY, Camera, FloatArray, Projectile
 from .gain import weigh_globals
@@ -46,6 +46,11 @@ class Prediction:
     depth: float
     depth_sigma: float
     stop: float
+
+    @property
+    def text(self) -> str:
+        """Depth and stopping time in the units of the laboratory."""
+        return f"{self.depth * 1e3:.3f} ± {self.depth_sigma * 1e3:.3f} mm in {self.stop * 1e3:.2f} ms"
 
 
 def plan_drops(
@@ -176,7 +181,7 @@ def _list_others(problem: Problem) -> list[tuple[Projectile, float]]:
     ]
 
 
-def _plan_film(problem: Problem, name: str, projectile: Projectile, depth: float, stop: float) -> PlannedDrop:
+def _plan_film(problem: Problem, name: str, projectile: Projectile, depth: float, stop: float) -> FilmedDrop:
     """A film of a drop that stops at ``depth`` (m) after ``stop`` (s), by the campaign's usual camera."""
     films = [drop for drop in problem.drops if isinstance(drop, ObservedDrop)]
     like = films[0].drop if films else problem.campaign.drops[0]
@@ -194,4 +199,4 @@ def _plan_film(problem: Problem, name: str, projectile: Projectile, depth: float
     )
     time = stop * np.concatenate([np.linspace(-1.0, -0.05, FALL), np.linspace(0.03, END, DUST)])
     share = max(camera.frame_rate * stop * END / DUST, 1.0)  # frames that one row stands for
-    return PlannedDrop(drop, time, np.zeros(time.size), math.hypot(sigma / math.sqrt(share), ROUGH * depth))
+    return FilmedDrop(drop, time, np.zeros(time.size), math.hypot(sigma / math.sqrt(share), ROUGH * depth))

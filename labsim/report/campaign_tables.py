@@ -15,7 +15,6 @@ from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
 from ..diagnosis.judge import MOST_NAMED
 from ..diagnosis.misfit import say_misfit
-from ..diagnosis.next_experiment import Suggestion
 from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
@@ -133,7 +132,7 @@ def state_numerical_error(problem: Problem) -> dict[str, float]:
     return {"depth_relative": NUMERICAL_DEPTH, "spacing_m": min(radii) / problem.grid.cells}
 
 
-def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) -> dict[str, Any]:
+def campaign_diagnosis_summary(found: Diagnosis) -> dict[str, Any]:
     """diagnosis.json, with the contract's keys."""
     fits = {fit.hypothesis: fit for fit in found.rivals}
     causes = []
@@ -165,7 +164,7 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
         "format": 1,
         "campaign": found.campaign.name,
         "verdict": found.verdict.word,
-        "remedy": say_remedy(found, suggestions),
+        "remedy": say_remedy(found, found.suggestions),
         "p_value": found.p_value,
         "causes": causes,
         "inclusion_probability": {
@@ -224,14 +223,14 @@ def campaign_diagnosis_summary(found: Diagnosis, suggestions: list[Suggestion]) 
                 "predictions": [
                     {
                         "cause": cause,
-                        "depth_mm": depth * 1e3,
-                        "depth_sd_mm": sigma * 1e3,
-                        "stopping_time_ms": stop * 1e3,
+                        "depth_mm": expected.depth * 1e3,
+                        "depth_sd_mm": expected.depth_sigma * 1e3,
+                        "stopping_time_ms": expected.stop * 1e3,
                     }
-                    for cause, depth, sigma, stop in each.predictions
+                    for cause, expected in each.predictions
                 ],
             }
-            for each in suggestions
+            for each in found.suggestions
         ],
         "numerical_error": state_numerical_error(found.problem),
         "scatter": found.scatter.summarise(),
@@ -349,9 +348,9 @@ def say_gain(gain: Gain, records: str = "drops") -> str:
     return f"held-out {records} are missed by {after} instead of {before} ({noise} are expected)"
 
 
-def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) -> str:
+def campaign_diagnosis_lines(found: Diagnosis) -> str:
     label, unit, factor = show_parameter(found.campaign.material.law)
-    lines = [*_say_doubts(found), say_verdict(found), say_remedy(found, suggestions), ""]
+    lines = [*_say_doubts(found), say_verdict(found), say_remedy(found, found.suggestions), ""]
     lines.append("  probability  cause")
     worth = [each for each in found.verdict.probabilities if each[1] >= 5e-4][:6]
     wide = max((len(" + ".join(hypothesis)) for hypothesis, _ in worth), default=0)
@@ -382,12 +381,10 @@ def campaign_diagnosis_lines(found: Diagnosis, suggestions: list[Suggestion]) ->
         lines.append(f"  hard to tell apart here: {first} and {second} (cosine {cosine:+.2f})")
     lines += [f"  {text}" for text in say_learned(found)]
     lines += _say_untestable(found)
-    if suggestions:
-        lines.append(f"  next experiment: {suggestions[0].text} ({suggestions[0].bits})")
-        lines += [
-            f"    {cause} expects {depth * 1e3:.3f} ± {sigma * 1e3:.3f} mm in {stop * 1e3:.2f} ms"
-            for cause, depth, sigma, stop in suggestions[0].predictions[:MOST_NAMED]
-        ]
+    if found.suggestions:
+        best = found.suggestions[0]
+        lines.append(f"  next experiment: {best.text} ({best.bits})")
+        lines += [f"    {cause} expects {each.text}" for cause, each in best.predictions[:MOST_NAMED]]
     lines.append(f"  {found.runs_new} new runs, {found.runs_reused} from the store, {found.wall:.0f} s")
     return "\n".join([*lines, *(f"  warning: {text}" for text in found.warnings[found.doubts :])])
 

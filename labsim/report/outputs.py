@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from .. import text_files
 from ..campaign_tables import MATERIAL_KEYS
 from ..diagnosis.campaign import Diagnosis
-from ..diagnosis.next_experiment import Suggestion, suggest
 from ..diagnosis.published.campaign import SummaryDiagnosis
 from ..effects import Model, list_effects, write_model
 from ..inference.calibrate import Calibration
@@ -83,14 +82,10 @@ def say_result(found: Any) -> str | None:
     if isinstance(found, Calibration):
         return campaign_calibration_lines(found)
     if isinstance(found, Diagnosis):
-        return campaign_diagnosis_lines(found, _suggest(found))
+        return campaign_diagnosis_lines(found)
     if isinstance(found, SummaryCalibration):
         return calibration_lines(found)
     return diagnosis_lines(found) if isinstance(found, SummaryDiagnosis) else None
-
-
-def _suggest(found: Diagnosis) -> list[Suggestion]:
-    return suggest(found.problem, [found.nominal, *found.rivals], dict(found.verdict.probabilities))
 
 
 def plot_drops(found: Calibration | Diagnosis, figure: Figure | None = None) -> list[tuple[Axes, Axes]]:
@@ -124,14 +119,13 @@ def _write_calibration(found: Calibration, folder: Path, write_json: Write) -> t
 
 
 def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple[dict, str]:
-    suggestions = _suggest(found)
-    summary = campaign_diagnosis_summary(found, suggestions)
+    summary = campaign_diagnosis_summary(found)
     write_json(folder / "diagnosis.json", summary)
     write_model(folder / "model.toml", extended_model(found), list_effects(found.campaign))
     _write_posterior(found.posterior_extended, folder)
     if found.problem.pushed:
-        write_push_diagnosis(found, summary, suggestions, folder)
-        return summary, campaign_diagnosis_lines(found, suggestions)
+        write_push_diagnosis(found, summary, folder)
+        return summary, campaign_diagnosis_lines(found)
     fits = list_fits(found)
     views, maps = _draw_fits(found, fits, folder)
     figures.draw_causes(found, folder / "causes.png")
@@ -142,8 +136,8 @@ def _write_diagnosis(found: Diagnosis, folder: Path, write_json: Write) -> tuple
     figures.draw_held_out(found, [name for name, _ in fits], folder / "held_out.png")
     figures.draw_p_m(list_posteriors(found), folder / "posterior.png")
     figures.draw_posterior(found.posterior_extended, folder / "corner.png")
-    write_campaign_page(found, summary, suggestions, views, maps, folder)
-    return summary, campaign_diagnosis_lines(found, suggestions)
+    write_campaign_page(found, summary, views, maps, folder)
+    return summary, campaign_diagnosis_lines(found)
 
 
 def _write_summary_calibration(

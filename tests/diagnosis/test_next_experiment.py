@@ -107,10 +107,10 @@ def test_suggestions_say_what_each_cause_predicts(fitted) -> None:
     problem, nominal, friction = fitted
     found = suggest(problem, [nominal, friction], {("none",): 0.4, ("side_friction",): 0.6})
     assert found and found[0].information_bits == max(each.information_bits for each in found)
-    names, depths, sigmas, stops = zip(*found[0].predictions, strict=True)
+    names, predictions = zip(*found[0].predictions, strict=True)
     assert names == ("side_friction", "none")
-    assert all(0.0 < sigma < 0.1 * depth for depth, sigma in zip(depths, sigmas, strict=True))
-    assert all(5e-4 < stop < 2e-2 for stop in stops)
+    assert all(0.0 < each.depth_sigma < 0.1 * each.depth for each in predictions)
+    assert all(5e-4 < each.stop < 2e-2 for each in predictions)
     # where the first is certain no other projectile is asked for
     sure = suggest(problem, [nominal, friction], {("none",): 0.02, ("side_friction",): 0.98})
     assert not any("another projectile" in each.change for each in sure)

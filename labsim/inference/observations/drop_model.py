@@ -12,7 +12,7 @@ import numpy as np
 from ...effects import Instrument
 from ...records import Camera, FloatArray
 from ..emulation.forward import Instant, ResponseTable, predict_depth, predict_speed
-from .observe import ObservedDrop, PlannedDrop
+from .observe import FilmedDrop, ObservedDrop
 
 BIN = 8  # frames of free fall averaged into one point
 ALONG = 0.4  # of the stopping time, over which the solver's error of the depth changes
@@ -27,7 +27,7 @@ WIDTHS = (FREE, SPEED_WIDTH)
 class DropModel:
     """One drop with its response table. start : its nuisances by its own free fall; matrix : (points, frames) averages that."""
 
-    observed: ObservedDrop | PlannedDrop
+    observed: FilmedDrop
     table: ResponseTable
     start: Instant
     matrix: FloatArray

@@ -29,23 +29,31 @@ SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
 
 
 @dataclass(frozen=True)
-class ObservedDrop:
-    """One drop on the stated scales. time, depth : (n,) s, m; depth is positive below the stated surface; sigma : m.
-
-    track, curve : what they come from.
-    """
+class FilmedDrop:
+    """One drop on the stated scales. time, depth : (n,) s, m; depth is positive below the stated surface; sigma : m."""
 
     drop: Drop
     time: FloatArray
     depth: FloatArray
     sigma: float
-    rejected: int
-    track: Track
-    curve: DecelerationCurve
 
     @property
     def name(self) -> str:
         return self.drop.name
+
+    @property
+    def pixel(self) -> float:
+        assert self.drop.camera is not None
+        return self.drop.camera.pixel_size
+
+
+@dataclass(frozen=True)
+class ObservedDrop(FilmedDrop):
+    """One that was filmed. rejected : frames left out; track, curve : what it comes from."""
+
+    rejected: int
+    track: Track
+    curve: DecelerationCurve
 
     @property
     def contact_time(self) -> float:
@@ -56,30 +64,6 @@ class ObservedDrop:
     def impact_speed(self) -> float:
         """m/s on the stated scales, a starting value."""
         return self.curve.impact_speed.value
-
-    @property
-    def pixel(self) -> float:
-        assert self.drop.camera is not None
-        return self.drop.camera.pixel_size
-
-
-@dataclass(frozen=True)
-class PlannedDrop:
-    """A drop that may be filmed: times of rows (n,) s, their error (m), and noughts in place of depths."""
-
-    drop: Drop
-    time: FloatArray
-    depth: FloatArray
-    sigma: float
-
-    @property
-    def name(self) -> str:
-        return self.drop.name
-
-    @property
-    def pixel(self) -> float:
-        assert self.drop.camera is not None
-        return self.drop.camera.pixel_size
 
 
 Observed = ObservedDrop | ObservedImpact | ObservedPush  # what one instrument recorded of one drop or push

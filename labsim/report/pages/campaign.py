@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from ...diagnosis.campaign import Diagnosis
-from ...diagnosis.next_experiment import Suggestion
 from ...inference.calibrate import Calibration
 from ...inference.fits.fitting import DOUBTFUL, Fit
 from ...inference.fits.posterior import Posterior
@@ -45,7 +44,6 @@ PICTURES = {
 def write_campaign_page(
     found: Diagnosis,
     summary: dict,
-    suggestions: list[Suggestion],
     views: Sequence[DropView],
     maps: Sequence[MapView],
     folder: Path,
@@ -119,7 +117,7 @@ def write_campaign_page(
         confusable=confusable,
         untestable=describe_untestable(found),
         gain=describe_gain(found, summary, labels),
-        suggestions=suggestions,
+        suggestions=found.suggestions,
         numerics=describe_numerics(summary["numerical_error"], found.problem),
         warnings=found.warnings,
         runs=(found.runs_new, found.runs_reused, found.wall),

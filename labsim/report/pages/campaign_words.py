@@ -9,7 +9,7 @@ import numpy as np
 
 from ...inference.fits.fitting import Fit
 from ...inference.fits.posterior import Posterior
-from ...inference.observations.observe import Observed, ObservedDrop, PlannedDrop
+from ...inference.observations.observe import Observed, ObservedDrop
 from ...inference.observations.observe_acceleration import ObservedImpact
 from ...inference.observations.observe_push import ObservedPush
 from ...inference.problem import Problem
@@ -33,7 +33,7 @@ def describe_measurement(campaign: Campaign, problem: Problem, views: Sequence[D
         f"The nominal simulation is {campaign.geometry}, with gravity of {campaign.gravity:g} m/s²."
     )
     groups: dict[tuple, list[DropView]] = {}
-    drops = {model.observed.name: model.observed for model in problem.tracks.models}
+    drops = {drop.name: drop for drop in problem.drops}
     for view in views:
         camera = drops[view.name].drop.camera
         key = (say_projectile(view), camera and camera.frame_rate, camera and camera.pixel_size)
@@ -51,7 +51,7 @@ def describe_measurement(campaign: Campaign, problem: Problem, views: Sequence[D
                 "rate": show_number(rate, "{:g}"),
                 "pixel": show_number(pixel * 1e6 if pixel else None, "{:g}"),
                 "used": sum(each.time.size for each in observed if not isinstance(each, ObservedPush)),
-                "rejected": sum(each.rejected for each in observed if not isinstance(each, PlannedDrop)),
+                "rejected": sum(each.rejected for each in observed),
             }
         )
     return {"words": words, "projectiles": rows, "left_out": "; ".join(_left_out(campaign.drops, drops))}

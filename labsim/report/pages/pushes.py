@@ -142,9 +142,7 @@ def lay_misfit(views: Sequence[PushView], ax: Axes) -> None:
     ax.grid(axis="y", color=GREY, alpha=0.2)
 
 
-def write_push_diagnosis(
-    found: Diagnosis, summary: dict, suggestions: list[Suggestion], folder: Path
-) -> Path:
+def write_push_diagnosis(found: Diagnosis, summary: dict, folder: Path) -> Path:
     """Pictures and report.html of a diagnosis."""
     fits = list_fits(found)
     views = _draw(found, fits, folder)
@@ -176,7 +174,7 @@ def write_push_diagnosis(
     return _write(
         found, views, folder, tiles, found.verdict.word, BADGES[found.verdict.word],
         f"{say_verdict(found)} {summary['remedy']}", causes=describe_causes(found, summary), gain=words,
-        suggestions=suggestions,
+        suggestions=found.suggestions,
     )  # fmt: skip
 
 
