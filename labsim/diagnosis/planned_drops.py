@@ -3,7 +3,8 @@
 A planned drop is one more record in the likelihood, without data. About the best of a hypothesis its rows and those of all drops
 have one joint normal distribution, errors that they share included; given today's data its own rows are normal too, with a mean
 that corrects the simulation as the drops so far ask for. So an error that is common to all drops, as what another code would say
-of p_m, costs a planned drop nothing.
+of p_m, costs a planned drop nothing. Contact and speed are known from a free fall that is seen as planned: left free, their prior
+is so wide that the least difference of two simulated speeds would pass for evidence.
 """
 
 from __future__ import annotations
@@ -31,15 +32,14 @@ USUAL_SIGMA, USUAL_PIXEL = 2e-6, 1e-5  # m, of a camera where no drop had one
 USUAL_FRAMES = 40.0  # of it, up to the stop
 FALL, DUST = 6, 24  # rows that stand for all frames before contact, one stopping time long, and after it
 END = 1.05  # of the stopping time: films are compared up to the stop
-ROUGH = 0.003  # of the depth, by which rows of two hypotheses differ that are interpolated between other runs
 HEAVIER, LARGER = 3.0, 2.0  # than the usual projectile, in mass and in radius
 ALIKE = 1.3  # factor in radius, or in mass over its cube, within which a projectile is there already
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of one planned drop by one hypothesis. mean : (n,) m, spread : (n, n) of its rows; depth, depth_sigma : m, at the speed
-    that it is planned for; stop : s."""
+    """Of one planned drop by one hypothesis. mean : (n,) m, spread : (n, n) of its rows in the dust, where the free fall above is
+    seen as planned; depth, depth_sigma : m; stop : s."""
 
     mean: FloatArray
     spread: FloatArray
@@ -89,8 +89,8 @@ def plan_drops(
         projectile = groups[number].projectile
         table = next(each.table for each in features if each.group == number)
         name = f"planned {len(models) + 1}"
-        depth, stop = np.exp(table.features(fit.log_p_m, math.log(speed), fit.values)[:2])
-        seen = _plan_film(problem, name, projectile, float(depth), float(stop))
+        stop = math.exp(table.features(fit.log_p_m, math.log(speed), fit.values)[1])
+        seen = _plan_film(problem, name, projectile, stop)
         text = (
             f"{words} the {2e3 * projectile.tip_radius:.3g} mm tip of {projectile.mass * 1e6:.3g} mg at {speed:.2f} m/s "
             f"(height {speed**2 / 2 / STANDARD_GRAVITY * 1e3:.1f} mm)"
@@ -137,24 +137,32 @@ def predict_planned(problem: Problem, extended: Problem, fit: Fit) -> list[Predi
         spread = linear.covariance[own, own] - cross @ cho_solve(factor, cross.T)
         spread = spread + reach @ covariance @ reach.T
         features = model.table.features(fit.log_p_m + offsets[name], model.start.log_speed, fit.values)
+        time, speed = model.observed.time, math.exp(model.start.log_speed)
+        falls = time < 0.0
+        fall = time[falls] * (speed + 0.5 * STANDARD_GRAVITY * time[falls])
+        mean, spread = _condition(mean, spread, falls, fall)
         deepest = int(np.argmax(mean))
         found.append(
             Prediction(
                 mean,
                 spread,
                 float(mean[deepest]),
-                _find_sigma(spread, deepest, model.observed.time < 0.0),
+                math.sqrt(spread[deepest, deepest]),
                 math.exp(features[1]) * instruments[name].rate_factor,
             )
         )
     return found
 
 
-def _find_sigma(spread: FloatArray, row: int, falls: np.ndarray) -> float:
-    """Standard deviation of one row where those of the free fall are as predicted: contact and speed are then known."""
-    across = spread[row, falls]
-    own = spread[row, row] - across @ np.linalg.solve(spread[np.ix_(falls, falls)], across)
-    return math.sqrt(max(own, 0.0))
+def _condition(
+    mean: FloatArray, spread: FloatArray, known: np.ndarray, values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and covariance of the other entries of a normal distribution, where the ``known`` (n,) ones have these values."""
+    across = np.linalg.solve(spread[np.ix_(known, known)], spread[known][:, ~known]).T
+    return (
+        mean[~known] + across @ (values - mean[known]),
+        spread[np.ix_(~known, ~known)] - across @ spread[known][:, ~known],
+    )
 
 
 def _list_others(problem: Problem) -> list[tuple[Projectile, float]]:
@@ -181,8 +189,8 @@ def _list_others(problem: Problem) -> list[tuple[Projectile, float]]:
     ]
 
 
-def _plan_film(problem: Problem, name: str, projectile: Projectile, depth: float, stop: float) -> FilmedDrop:
-    """A film of a drop that stops at ``depth`` (m) after ``stop`` (s), by the campaign's usual camera."""
+def _plan_film(problem: Problem, name: str, projectile: Projectile, stop: float) -> FilmedDrop:
+    """A film of a drop that stops after ``stop`` (s), by the campaign's usual camera."""
     films = [drop for drop in problem.drops if isinstance(drop, ObservedDrop)]
     like = films[0].drop if films else problem.campaign.drops[0]
     camera = like.camera or Camera(USUAL_FRAMES / stop, USUAL_PIXEL, 0.0, 0.0)
@@ -199,4 +207,4 @@ def _plan_film(problem: Problem, name: str, projectile: Projectile, depth: float
     )
     time = stop * np.concatenate([np.linspace(-1.0, -0.05, FALL), np.linspace(0.03, END, DUST)])
     share = max(camera.frame_rate * stop * END / DUST, 1.0)  # frames that one row stands for
-    return FilmedDrop(drop, time, np.zeros(time.size), math.hypot(sigma / math.sqrt(share), ROUGH * depth))
+    return FilmedDrop(drop, time, np.zeros(time.size), sigma / math.sqrt(share))

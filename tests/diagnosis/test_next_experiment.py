@@ -90,14 +90,21 @@ def test_a_prediction_is_the_normal_distribution_given_today_s_data(fitted, plan
     joint = linear.covariance + sum(
         each**2 * np.outer(linear.tangents[name], linear.tangents[name]) for name, each in widths.items()
     )
-    first = linear.sections[extended.tracks.models[6].observed.name]
+    model = extended.tracks.models[6]
+    first, time = linear.sections[model.observed.name], model.observed.time
+    dust = np.arange(len(joint))[first][time > 0.0]
     seen = np.arange(len(joint)) < first.start
-    weights = np.linalg.solve(joint[np.ix_(seen, seen)], joint[seen][:, first]).T
+    seen[first] = time < 0.0
     # the prior of the effect is about its null, not about the fit
     away = -friction.values["side_friction"]
     residual = linear.residual - linear.tangents["side_friction"] * away
-    mean = weights @ residual[seen] - residual[first]
-    spread = joint[first, first] - weights @ joint[seen][:, first]
+    # what is seen of the planned drop is its free fall, as planned; its data are nought
+    fall = time * (math.exp(model.start.log_speed) + 0.5 * 9.81 * time)
+    data = np.zeros(len(joint))
+    data[first] = np.where(time < 0.0, fall, 0.0)
+    weights = np.linalg.solve(joint[np.ix_(seen, seen)], joint[seen][:, dust]).T
+    mean = weights @ (residual + data)[seen] - residual[dust]
+    spread = joint[np.ix_(dust, dust)] - weights @ joint[seen][:, dust]
     scale = predictions[0].depth
     assert predictions[0].mean == pytest.approx(mean, abs=2e-4 * scale)
     assert np.sqrt(np.diag(predictions[0].spread)) == pytest.approx(np.sqrt(np.diag(spread)), rel=0.01)
@@ -115,6 +122,15 @@ def test_suggestions_say_what_each_cause_predicts(fitted) -> None:
     sure = suggest(problem, [nominal, friction], {("none",): 0.02, ("side_friction",): 0.98})
     assert not any("another projectile" in each.change for each in sure)
     assert suggest(problem, [nominal], {("none",): 1.0}) == []
+
+
+def test_the_same_hypothesis_about_another_point_tells_nothing(fitted, planned) -> None:
+    """A model that is linear has one prediction, wherever it is taken for a straight line."""
+    problem, nominal, _ = fitted
+    extended, _, (here, _) = planned
+    there = predict_planned(problem, extended, replace(nominal, log_p_m=nominal.log_p_m + 0.02))
+    for one, other in zip(here, there, strict=True):
+        assert expected_weight([one.mean, other.mean], [one.spread, other.spread], EVEN) < 0.2
 
 
 @pytest.mark.parametrize("apart", [0.0, 2.0, 50.0])
