@@ -44,7 +44,10 @@ def needs_exploration(
     However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another.
     log_evidence_unknown : ln evidence of a law without a name.
     """
-    best = max([log_evidence_unknown - nominal.evidence, *(each.log_bayes for each in screening.scores[:1])])
+    gains = [each.evidence - nominal.evidence for each in fits]
+    best = max(
+        [log_evidence_unknown - nominal.evidence, *gains, *(each.log_bayes for each in screening.scores[:1])]
+    )
     if best <= PROMISING and fit_p_value(nominal) >= DOUBTFUL:
         return False
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)

@@ -32,10 +32,11 @@ from .observations.acceleration_model import make_acceleration_model
 from .observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, extract_map
 from .observations.drop_model import make_drop_model
 from .observations.linearised_drop import ErrorBudget, RecordModel
-from .observations.observe import Observed, observe_drops
+from .observations.observe import Observed, ObservedDrop, observe_drops
 from .observations.observe_acceleration import ObservedImpact
 from .observations.observe_push import ObservedPush, measure_ground
 from .observations.push_model import PushModel, extract_push
+from .observations.rebounds import Rebound, Rebounds, extract_rebound, measure_rebound
 from .observations.sleeve_friction import SleeveFriction, TipSleeves, extract_sleeve, measure_spread
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
@@ -76,6 +77,7 @@ def open_problem(
     features: list[RunFeatures] = []
     of_speeds: list[RunFeatures] = []
     sleeves: list[TipSleeves] = []
+    rebounds: list[Rebound] = []
     dropped = [drop for drop in drops if not isinstance(drop, ObservedPush)]
     pushed = [drop for drop in drops if isinstance(drop, ObservedPush)]
     of_tips = [push for push in pushed if not push.feels_shaft]
@@ -114,6 +116,13 @@ def open_problem(
         speeds = ResponseTable(np.log(nodes), sparse)
         if felt:
             of_speeds.append(RunFeatures(len(groups) - 1, speeds, extract_speeds))
+        else:
+            lifts = RunFeatures(len(groups) - 1, ResponseTable(np.log(nodes), sparse), extract_rebound)
+            rebounds += [
+                Rebound(drop, *way, lifts)
+                for drop in group
+                if isinstance(drop, ObservedDrop) and (way := measure_rebound(drop)) is not None
+            ]
         models += [
             make_acceleration_model(drop, speeds, errors)
             if isinstance(drop, ObservedImpact)
@@ -122,6 +131,8 @@ def open_problem(
             if not isinstance(drop, ObservedPush)
         ]
     observations.append(Tracks(tuple(models), (*features, *of_speeds), name="drops" if dropped else "pushes"))
+    if rebounds:
+        observations.append(Rebounds(tuple(rebounds)))
     if sleeves:
         observations.append(SleeveFriction(tuple(sleeves)))
     zones = []

@@ -35,6 +35,8 @@ SLACK = 0.25  # of one ratio, which all together may be longer: a node more for 
 # is off by up to half a per cent and the force by one (benchmarks/acceleration/emulator.py). Those nearer than SAME_SPEED share a
 # node, one alone lies amid two; more than MOST_SPEEDS are cheaper from nodes FELT_RATIO apart
 SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, 1.3
+# of the stopping time: what runs of filmed drops need for the way back up (observations/rebounds.py), and all others
+LIFTING, SETTLING = 0.34, 0.16
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
 # of fingerprints: what an effect changes needs less than what it is added to (docs/discretisation.md). More where fits have more
 # than the usual, in proportion
@@ -188,9 +190,14 @@ def _unit_spline(nodes: tuple[float, ...]) -> CubicSpline:
 
 
 def set_nominal_drop(
-    campaign: Campaign, projectile: Projectile, speed: float, p_m: float, cells: float
+    campaign: Campaign,
+    projectile: Projectile,
+    speed: float,
+    p_m: float,
+    cells: float,
+    after_stop: float = SETTLING,
 ) -> DropSetting:
-    """What the campaign states, as one drop: speed m/s, p_m Pa, cells spacings in a tip radius."""
+    """What the campaign states, as one drop: speed m/s, p_m Pa, cells spacings in a tip radius, after_stop of T_s."""
     return DropSetting(
         projectile=projectile,
         impact_speed=speed,
@@ -200,7 +207,7 @@ def set_nominal_drop(
         gravity=campaign.gravity,
         geometry=campaign.geometry,
         spacing=projectile.tip_radius / cells,
-        after_stop=0.16,
+        after_stop=after_stop,
     )
 
 
@@ -268,7 +275,9 @@ class RunGrid:
             usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
         of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
-        setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own)
+        short = group.is_scan or group.pushed or group.felt
+        after_stop = SETTLING if short else LIFTING
+        setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own, after_stop)
         if group.pushed:
             setting = set_push(setting, speed)
         return setting if self.extension is None else self.extension(setting)
