@@ -30,7 +30,7 @@ OWN, COMMON = 0.15, 0.08  # of the way: of each drop alone, and of drops that ar
 
 @dataclass(frozen=True)
 class Rebound:
-    """One drop that was lifted. way, sigma : m on the stated scale, and the film's noise; features : of runs of its projectile."""
+    """One drop that was lifted. way, sigma : m on the stated scale, and the film's noise; features : of its projectile's runs."""
 
     drop: ObservedDrop
     way: float
