@@ -17,7 +17,13 @@ from ..figures.campaign import choose_decisive
 from ..figures.interactive import plot_drop, plot_held_out, plot_map, plot_misfit, plot_p_m, plot_undisturbed
 from ..figures.laws import plot_law
 from ..provenance import trace_origin
-from .campaign_words import describe_calibration, describe_measurement, describe_misfit, describe_numerics
+from .campaign_words import (
+    describe_calibration,
+    describe_measurement,
+    describe_misfit,
+    describe_numerics,
+    say_rebounds,
+)
 from .cause_words import BADGES, describe_causes, describe_gain, describe_untestable, list_confusable
 from .drop_views import DropView, list_fits, list_posteriors
 from .law_words import comes_nearest, describe_laws, size_of_missing
@@ -173,6 +179,7 @@ def write_calibration_page(
             len(views),
         ),
         diagnosed=False,
+        fits=list_fits(found),
         numerics=describe_numerics(numerical_error, found.problem),
         warnings=found.warnings,
         runs=(found.runs_new, found.runs_reused, found.wall),
@@ -218,7 +225,7 @@ def _write(
     runs: tuple[int, int, float],
     diagnosed: bool,
     cause: Sequence[str] = (),
-    fits: Sequence[tuple[str, Fit]] = (),
+    fits: Sequence[tuple[str, Fit]],
     **values: Any,
 ) -> Path:
     contents = [
@@ -251,6 +258,7 @@ def _write(
         contents=[(anchor, title, notes.get(anchor, "")) for anchor, title in contents],
         measurement=describe_measurement(campaign, problem, views),
         misfit=describe_misfit(views),
+        rebounds=say_rebounds(problem, fits),
         maps=describe_maps(campaign, problem, maps) if campaign.scans else None,
         pictures=pictures | {"decisive": pictures[shown]},
         decisive=decisive,

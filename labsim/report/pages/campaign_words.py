@@ -12,6 +12,7 @@ from ...inference.fits.posterior import Posterior
 from ...inference.observations.observe import Observed, ObservedDrop
 from ...inference.observations.observe_acceleration import ObservedImpact
 from ...inference.observations.observe_push import ObservedPush
+from ...inference.observations.rebounds import COMMON, OWN, Rebounds
 from ...inference.problem import Problem
 from ...inference.scatter import ScatterEstimate
 from ...records import Campaign, Drop
@@ -173,6 +174,25 @@ def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
     )
     kinds = list(dict.fromkeys(map(say_projectile, views)))
     return {"words": words, "rows": rows, "text": text, "symbols": list(zip(SIGNS * 9, kinds, strict=False))}
+
+
+def say_rebounds(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> str:
+    """How far drops come back up, measured and by each named fit; empty where no film shows it."""
+    place = next((k for k, each in enumerate(problem.observations) if isinstance(each, Rebounds)), None)
+    if place is None:
+        return ""
+    rebounds = problem.observations[place]
+    assert isinstance(rebounds, Rebounds)
+    ways = np.array([each.way for each in rebounds.drops])
+    simulated = [
+        f"{1e6 * float(np.mean(ways - fit.blocks[place].residual)):.1f} µm ({label.replace('_', ' ')})"
+        for label, fit in fits
+    ]
+    return (
+        f"After the stop the dust springs back: it lifts {say_count(len(ways), 'drop')} by {1e6 * float(ways.mean()):.1f} µm "
+        f"in the mean. Simulated are {', '.join(simulated)}, right to {100 * OWN:.0f} % for one drop and {100 * COMMON:.0f} % "
+        "for all. How far says how stiff the dust is. Of other drops too few frames show it."
+    )
 
 
 def describe_numerics(error: dict[str, float], problem: Problem) -> str:
