@@ -20,20 +20,24 @@ from labsim.sph import DropSetting, simulate
 
 AFTER = np.array([0.25, 0.5])  # stopping times after the stop
 MESH_CELLS, POINT_CELLS = 12.0, 12.0  # in a tip radius
-# radius (m), speed (m/s), p_m (Pa), bulk modulus (Pa), tensile and shear factor
+# radius (m), speed (m/s), p_m (Pa), bulk modulus (Pa), tensile and shear factor, friction on the side (N/m)
 CASES = (
-    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 1.0),
-    (0.5e-3, 0.25, 1300.0, 45e3, 1.0, 1.0),
-    (1.5e-3, 0.40, 1300.0, 45e3, 1.0, 1.0),
-    (0.5e-3, 0.40, 700.0, 45e3, 1.0, 1.0),
-    (0.5e-3, 0.60, 2500.0, 45e3, 1.0, 1.0),
-    (0.5e-3, 0.50, 1300.0, 7e3, 1.0, 1.0),
-    (0.5e-3, 0.50, 1300.0, 15e3, 1.0, 1.0),
-    (0.5e-3, 0.50, 1300.0, 135e3, 1.0, 1.0),
-    (0.5e-3, 0.50, 1300.0, 45e3, 0.3, 1.0),
-    (0.5e-3, 0.50, 1300.0, 45e3, 3.0, 1.0),
-    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 0.5),
-    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 2.0),
+    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.25, 1300.0, 45e3, 1.0, 1.0, 0.0),
+    (1.5e-3, 0.40, 1300.0, 45e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.40, 700.0, 45e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.60, 2500.0, 45e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 7e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 15e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 135e3, 1.0, 1.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 45e3, 0.3, 1.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 45e3, 3.0, 1.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 0.5, 0.0),
+    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 2.0, 0.0),
+    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 1.0, 0.2),
+    (0.5e-3, 0.50, 1300.0, 45e3, 1.0, 1.0, 0.4),
+    (0.5e-3, 0.25, 1300.0, 45e3, 1.0, 1.0, 0.4),
+    (1.5e-3, 0.40, 1300.0, 45e3, 1.0, 1.0, 1.2),
 )
 
 
@@ -51,16 +55,18 @@ def main() -> None:
     parser.add_argument("--box", type=float, nargs=2, help="width and depth of labsim's dust, tip radii")
     options = parser.parse_args()
     print(
-        "radius mm, speed m/s, p_m Pa, K0 kPa, T/T0, Y/Y0 | way up of the mesh, µm | of others, with the difference in %"
+        "radius mm, speed m/s, p_m Pa, K0 kPa, T/T0, Y/Y0, N/m | way up of the mesh, µm | of others, with the difference in %"
     )
-    for radius, speed, p_m, bulk, tensile, shear in CASES:
+    for radius, speed, p_m, bulk, tensile, shear, side in CASES:
         mass = mesh.BEAD * radius**3
         dust = mesh.Dust(p_m=p_m, bulk_modulus=bulk, tensile_factor=tensile, shear_factor=shear)
         numerics = mesh.Numerics(cells=MESH_CELLS, depth=6.0)
-        run = mesh.run_drop(dust, radius, speed, numerics, mass, after=1.0 + AFTER[-1])
+        forces = mesh.Forces(side=side)
+        run = mesh.run_drop(dust, radius, speed, numerics, mass, forces=forces, after=1.0 + AFTER[-1])
         lift = measure_lift(run.time, run.depth, run.stopping_time, run.stopping_depth)
-        line = f"{1e3 * radius:g} {speed:g} {p_m:g} {1e-3 * bulk:g} {tensile:g} {shear:g} | " + " ".join(
-            f"{x:.1f}" for x in lift
+        line = (
+            f"{1e3 * radius:g} {speed:g} {p_m:g} {1e-3 * bulk:g} {tensile:g} {shear:g} {side:g} | "
+            + " ".join(f"{x:.1f}" for x in lift)
         )
         others = {}
         width, depth = (None, None) if options.box is None else (each * radius for each in options.box)
@@ -74,6 +80,7 @@ def main() -> None:
                     material,
                     spacing=radius / cells,
                     after_stop=AFTER[-1],
+                    side_friction=side,
                     width=width,
                     depth=depth,
                 )
@@ -81,7 +88,7 @@ def main() -> None:
             others[f"labsim {cells:g}"] = measure_lift(
                 ours.time, ours.depth, ours.stopping_time, ours.penetration_depth
             )
-        if options.points:
+        if options.points and not side:
             found = points.run_drop(
                 points.Dust(p_m=p_m, bulk_modulus=bulk, tensile_factor=tensile, shear_factor=shear),
                 points.Body(radius=radius, mass=mass),

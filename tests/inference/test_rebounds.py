@@ -15,6 +15,7 @@ from labsim.inference.observations import Observation, RunFeatures
 from labsim.inference.observations.linearised_drop import ErrorBudget, Perturbation
 from labsim.inference.observations.observe import observe_drop
 from labsim.inference.observations.rebounds import (
+    CHANGE,
     COMMON,
     OWN,
     Rebound,
@@ -105,7 +106,8 @@ def test_ways_are_compared_with_what_codes_differ_by() -> None:
     assert block.tangents["soft"] == pytest.approx(0.01 * DEPTH, rel=1e-6)
     # a depth that falls by 0.2 for twice the strength takes its share of the way along
     assert block.tangents["ln_p_m"] == pytest.approx(-0.2 / math.log(2.0) * expected, rel=0.01)
-    variance = 1e-12 + (OWN * expected) ** 2 + (COMMON * expected) ** 2
+    changed = 0.005 * DEPTH
+    variance = 1e-12 + (OWN * expected) ** 2 + (COMMON * expected) ** 2 + (CHANGE * changed) ** 2
     alike = (COMMON * expected) ** 2  # two drops of one projectile to one depth
     assert block.covariance == pytest.approx(np.array([[variance, alike], [alike, variance]]), rel=1e-9)
     assert linearise(rebounds, 0.5, 1.1).residual[0] == pytest.approx(21e-6 - expected / 1.1, rel=1e-9)

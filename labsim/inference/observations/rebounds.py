@@ -1,6 +1,7 @@
 """How far the dust lifts each drop after its stop: one datum a drop, which says how stiff the dust is.
 
-    way = mean depth at the stop - mean depth after it,  errors: the film's noise, OWN and COMMON of the simulated way
+    way = mean depth at the stop - mean depth after it,  errors: the film's noise, OWN and COMMON of the simulated way, and
+    CHANGE of what effects change of it
 
 The windows count in measured stopping times, in simulations in their own: around the stop nothing moves, and after it the way is
 complete. Codes differ in it by far more than in a depth, so it is no further row of the motion; its errors are measured beside a
@@ -26,6 +27,9 @@ from .observe import ObservedDrop
 AT_STOP, AFTER = (0.95, 1.05), (1.2, 1.33)  # of the stopping time
 FEWEST = 2  # frames in each
 OWN, COMMON = 0.15, 0.08  # of the way: of each drop alone, and of drops that are alike
+# of what effects change of it, of each drop alone: friction on the shaft takes half of the way or more, the mesh says 10 % less of
+# that, material points up to a half (p11)
+CHANGE = 0.3
 
 
 @dataclass(frozen=True)
@@ -83,8 +87,12 @@ class Rebounds(WithoutNuisances):
     def features(self) -> Sequence[RunFeatures]:
         return tuple({each.features.group: each.features for each in self.drops}.values())
 
-    def _predict(self, log_p_m: float, point: Perturbation) -> FloatArray:
-        return np.array([each.predict(log_p_m, point, point.amplitudes) for each in self.drops])
+    def _predict(
+        self, log_p_m: float, point: Perturbation, amplitudes: Mapping[str, float] | None = None
+    ) -> FloatArray:
+        """(drops, 2) ways (m) and ln of depths, with the amplitudes of the point or others."""
+        amplitudes = point.amplitudes if amplitudes is None else amplitudes
+        return np.array([each.predict(log_p_m, point, amplitudes) for each in self.drops])
 
     def linearise(
         self,
@@ -105,7 +113,8 @@ class Rebounds(WithoutNuisances):
                 for depth, p in zip(depths, projectiles, strict=True)
             ]
         )
-        white = [each.sigma**2 for each in self.drops] + (OWN * here) ** 2
+        plain = self._predict(log_p_m, nominal, {})[:, 0]
+        white = [each.sigma**2 for each in self.drops] + (OWN * here) ** 2 + (CHANGE * (here - plain)) ** 2
         covariance = np.outer(COMMON * here, COMMON * here) * np.exp(-0.5 * alike) + np.diag(white)
         ways = np.array([each.way for each in self.drops])
         sections = {each.name: slice(k, k + 1) for k, each in enumerate(self.drops)}
