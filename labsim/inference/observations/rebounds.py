@@ -27,8 +27,8 @@ from .observe import ObservedDrop
 AT_STOP, AFTER = (0.95, 1.05), (1.2, 1.33)  # of the stopping time
 FEWEST = 2  # frames in each
 OWN, COMMON = 0.15, 0.08  # of the way: of each drop alone, and of drops that are alike
-# of what effects change of it, of each drop alone: friction on the shaft takes half of the way or more, the mesh says 10 % less of
-# that, material points up to a half (p11)
+# of what effects change of it, of each drop alone: friction on the shaft takes half of the way or more; the mesh says 10 % less,
+# material points up to 50 % more or less (p11)
 CHANGE = 0.3
 
 
