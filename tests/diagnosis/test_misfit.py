@@ -16,9 +16,10 @@ def look(tmp_path, **changes):
 
 def test_nothing_is_missed_where_nothing_is_wrong(tmp_path):
     parts = look(tmp_path)
-    assert [part.name for part in parts] == ["drops", "map C01", "undisturbed dust"]
-    drops, scanned, _ = (part.sections for part in parts)
+    assert [part.name for part in parts] == ["drops", "rebounds", "map C01", "undisturbed dust"]
+    drops, rebounds, scanned, _ = (part.sections for part in parts)
     assert [drop.name for drop in drops] == [f"D{k:02d}" for k in range(1, 7)]
+    assert {one.name for one in rebounds} <= {drop.name for drop in drops}
     assert [one.name for one in scanned] == ["C01"]
     assert not any(part.missed for part in parts) and say_misfit(parts) == ""
 
@@ -26,7 +27,9 @@ def test_nothing_is_missed_where_nothing_is_wrong(tmp_path):
 def test_drops_that_move_otherwise_are_named(tmp_path):
     parts = look(tmp_path, bent=0.05)
     said = say_misfit(parts)
-    assert said.startswith("misses drops (χ²") and said.endswith("it meets map C01, undisturbed dust")
+    assert said.startswith("misses drops (χ²") and said.endswith(
+        "it meets rebounds, map C01, undisturbed dust"
+    )
     assert any(drop.missed for drop in parts[0].sections)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.next_experiment import expected_weight, suggest
@@ -87,17 +88,23 @@ def test_a_prediction_is_the_normal_distribution_given_today_s_data(fitted, plan
     parameter = problem.effects["side_friction"].amplitudes[0]
     width, _ = parameter.stand_in(friction.values["side_friction"])
     widths = {"ln_p_m": 30.0, "side_friction": width}
-    joint = linear.covariance + sum(
-        each**2 * np.outer(linear.tangents[name], linear.tangents[name]) for name, each in widths.items()
+    blocks = [
+        linear,
+        *friction.blocks[1:],
+    ]  # how far the drops came back up says something of the globals too
+    tangents = {name: np.concatenate([block.tangents[name] for block in blocks]) for name in widths}
+    joint = block_diag(*(block.covariance for block in blocks)) + sum(
+        each**2 * np.outer(tangents[name], tangents[name]) for name, each in widths.items()
     )
     model = extended.tracks.models[6]
     first, time = linear.sections[model.observed.name], model.observed.time
     dust = np.arange(len(joint))[first][time > 0.0]
     seen = np.arange(len(joint)) < first.start
     seen[first] = time < 0.0
+    seen[linear.residual.size :] = True
     # the prior of the effect is about its null, not about the fit
     away = -friction.values["side_friction"]
-    residual = linear.residual - linear.tangents["side_friction"] * away
+    residual = np.concatenate([block.residual for block in blocks]) - tangents["side_friction"] * away
     # what is seen of the planned drop is its free fall, as planned; its data are nought
     fall = time * (math.exp(model.start.log_speed) + 0.5 * 9.81 * time)
     data = np.zeros(len(joint))

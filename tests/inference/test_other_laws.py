@@ -69,9 +69,10 @@ def test_the_cohesion_that_is_hidden_is_found(tmp_path: Path) -> None:
                 filling_factor=0.5,
                 monomer_density=3000.0,
                 spacing=2e-3 / 7,
+                after_stop=0.5,
             )
         )
-        time = np.arange(-60, int(1.15 * run.stopping_time * RATE) + 40) / RATE
+        time = np.arange(-60, int(1.5 * run.stopping_time * RATE) + 40) / RATE
         fallen = np.where(
             time < 0, speed * time + 0.5 * 9.81 * time**2, run.depth_at(np.minimum(time, run.time[-1]))
         )
