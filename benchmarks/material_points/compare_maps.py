@@ -64,7 +64,7 @@ def main() -> None:
         }
         start = (math.log(truth["pm"]), values)
         fit = fit_hypothesis(problem, tuple(hidden), start, iterations=0, nuisances=nominal)
-        maps = fit.blocks[1]
+        maps = fit.blocks[[each.kind for each in problem.observations].index("map")]
         each = [Block(maps.residual[s], maps.covariance[s, s], {}) for s in maps.sections.values()]
         other = " | ".join(f"{rate_with(problem, fit, floor) - rate(maps):+.1f}" for floor in FLOORS)
         print(

@@ -25,8 +25,9 @@ def twice(tmp_path_factory):
     zones = CompactedZones((zone, replace(zone, observed=replace(zone.observed, scan=scan))))
     names = ["D01", zone.name, scan.name]
     perturbation = Perturbation({}, dict.fromkeys(names, Instrument()), {}, problem.campaign, 1.0)
-    one = solve_at(problem, ParameterPoint(fit.log_p_m, {}, fit.nuisances)).blocks[1]
-    speed = float(fit.nuisances[1][0])
+    place = [each.kind for each in problem.observations].index("map")
+    one = solve_at(problem, ParameterPoint(fit.log_p_m, {}, fit.nuisances)).blocks[place]
+    speed = float(fit.nuisances[place][0])
     both = zones.linearise(np.array([speed, speed]), fit.log_p_m, perturbation, ErrorBudget(), {})
     return one, both, zones, zone.linearise(speed, fit.log_p_m, perturbation, ErrorBudget(), {})
 
