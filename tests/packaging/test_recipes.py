@@ -108,7 +108,7 @@ def test_a_kind_of_measurement_of_the_campaign(tmp_path: Path) -> None:
     height = 1e3 * float(strength) / (read.sample.monomer_density * 0.15 * 9.81)
     (folder / "column_mm.txt").write_text(f"{height} {0.1 * height}\n")
     problem, both = prepare(read, store, workers=1)
-    assert [each.kind for each in problem.observations] == ["drops", "own weight"]
+    assert [each.kind for each in problem.observations] == ["drops", "rebounds", "own weight"]
     information = 1 / alone.covariance[0, 0] + 1 / (0.1**2 + 0.02**2)
     assert both.covariance[0, 0] == pytest.approx(1 / information, rel=0.02)
     assert np.exp(both.log_p_m) == pytest.approx(1300.0, rel=0.05)
