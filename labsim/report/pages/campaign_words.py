@@ -191,7 +191,8 @@ def say_rebounds(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> str:
     return (
         f"After the stop the dust springs back: it lifts {say_count(len(ways), 'drop')} by {1e6 * float(ways.mean()):.1f} µm "
         f"in the mean. Simulated are {', '.join(simulated)}, right to {100 * OWN:.0f} % for one drop and {100 * COMMON:.0f} % "
-        "for all. How far says how stiff the dust is. Of other drops too few frames show it."
+        "for all. How far says how stiff the dust is."
+        + (" Of other drops too few frames show it." if len(ways) < len(problem.tracks.samples) else "")
     )
 
 
