@@ -25,22 +25,23 @@ CLEAR = 0.2  # of the way
 def list_rebounds(folder: str, workers: int) -> pd.DataFrame:
     """A row a drop of one campaign."""
     problem, fit = prepare(read_campaign(folder), RunStore(), workers=workers)
-    rows = []
-    for observation, block in zip(problem.observations, fit.blocks, strict=True):
-        if isinstance(observation, Rebounds):
-            for each, left in zip(observation.drops, block.residual, strict=True):
-                simulated = each.way - left
-                rows.append(
-                    {
-                        "campaign": problem.campaign.name,
-                        "drop": each.name,
-                        "measured": each.way * 1e6,
-                        "simulated": simulated * 1e6,
-                        "more": left / simulated,
-                        "noise": each.sigma / simulated,
-                    }
-                )
-    return pd.DataFrame(rows)
+    found = problem.find(Rebounds)
+    if found is None:
+        return pd.DataFrame()
+    place, rebounds = found
+    measured = np.array([each.way for each in rebounds.drops])
+    left, noise = fit.blocks[place].residual, np.array([each.sigma for each in rebounds.drops])
+    simulated = measured - left
+    return pd.DataFrame(
+        {
+            "campaign": problem.campaign.name,
+            "drop": [each.name for each in rebounds.drops],
+            "measured": measured * 1e6,
+            "simulated": simulated * 1e6,
+            "more": left / simulated,
+            "noise": noise / simulated,
+        }
+    )
 
 
 def main() -> None:

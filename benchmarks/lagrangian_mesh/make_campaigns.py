@@ -30,7 +30,7 @@ SERIES = (
     (1.5e-3, 1.0, 0.42),
     (1.5e-3, 2.5, 0.22),
 )
-FILMED = 1.5  # stopping times, for which a film and its run go on
+AFTER = 1.5  # stopping times, for which a film and its run go on
 PIXELS = 0.03  # of a film, in tip radii
 # filling factors of the rows of a static test: a sample pulled apart a row, a sample squeezed all the way
 ROWS = {"tension": np.linspace(0.16, 0.40, 6), "compression_omnidirectional": np.linspace(0.14, 0.52, 25)}
@@ -63,7 +63,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 Numerics(cells=CELLS),
                 mass=mass * heavier_than_stated,
                 forces=Forces(side=hidden.get("body", {}).get("side", 0.0) * radius / labelled.SMALL),
-                after=FILMED if hidden.get("film") else 1.0,
+                after=AFTER if hidden.get("film") else 1.0,
             )
             label = f"D{k + 1:02d}"
             write_felt(
@@ -74,7 +74,7 @@ def make_campaign(job: tuple[dict, Path]) -> tuple[str, dict]:
                 shutil.rmtree(folder / "drops" / label)
             if hidden.get("film"):
                 filming = Filming(
-                    frame_rate=10e3, pixel_size=PIXELS * radius, after=FILMED * result.stopping_time
+                    frame_rate=10e3, pixel_size=PIXELS * radius, after=AFTER * result.stopping_time
                 )
                 film_drop(
                     folder / "drops" / f"{label}-film", result, speed, filming, beside,

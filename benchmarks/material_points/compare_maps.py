@@ -57,14 +57,15 @@ def main() -> None:
         if hidden is None or not (given.folder / name).is_dir():
             continue
         problem, nominal = prepare(read_campaign(given.folder / name), RunStore(given.store), workers=1)
-        if len(problem.scans) < 2:
+        found = problem.find(compacted_zone.CompactedZones)
+        if found is None or len(problem.scans) < 2:
             continue
         values = {
             effect: value - problem.effects[effect].amplitudes[0].null for effect, value in hidden.items()
         }
         start = (math.log(truth["pm"]), values)
         fit = fit_hypothesis(problem, tuple(hidden), start, iterations=0, nuisances=nominal)
-        maps = fit.blocks[[each.kind for each in problem.observations].index("map")]
+        maps = fit.blocks[found[0]]
         each = [Block(maps.residual[s], maps.covariance[s, s], {}) for s in maps.sections.values()]
         other = " | ".join(f"{rate_with(problem, fit, floor) - rate(maps):+.1f}" for floor in FLOORS)
         print(

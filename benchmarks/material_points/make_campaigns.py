@@ -42,7 +42,7 @@ SERIES = (
     (LARGE, 2.5, 0.30, 16.3e-3),
 )
 SCANS = (0.75, 0.37)  # m/s
-RISEN = 1.6  # of the stopping time, for which runs of rods go on: films show how far they come back up
+AFTER = 1.6  # of the stopping time, for which runs of rods go on: films show how far they come back up
 REST = 2.0  # of the stopping time: a bead is scanned after it has come to rest, some of its depth above the deepest point
 
 
@@ -86,7 +86,7 @@ def drop_rods(hidden: dict, folder: Path, rng: np.random.Generator) -> dict:
         if radius < 1e-3:
             own *= hidden.get("small_strength", 1.0)
         body = body_of(hidden, radius, mass * measure.get("mass", 1.0))
-        result = extrapolate_drop(dust_of(hidden, own), body, speed, NUMERICS, stop_factor=RISEN)
+        result = extrapolate_drop(dust_of(hidden, own), body, speed, NUMERICS, stop_factor=AFTER)
         assert result.stopping_time > 0.0, f"{hidden['name']} drop {k + 1} did not stop"
         label = f"D{k + 1:02d}"
         drops[label] = labelled.name_drop(result, speed, own)

@@ -44,14 +44,12 @@ def needs_exploration(
     However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another.
     log_evidence_unknown : ln evidence of a law without a name.
     """
-    gains = [each.evidence - nominal.evidence for each in fits]
-    best = max(
-        [log_evidence_unknown - nominal.evidence, *gains, *(each.log_bayes for each in screening.scores[:1])]
-    )
+    found = max(fits, key=lambda fit: fit.evidence, default=nominal)
+    gain, screened = found.evidence - nominal.evidence, [each.log_bayes for each in screening.scores[:1]]
+    best = max([log_evidence_unknown - nominal.evidence, gain, *screened])
     if best <= PROMISING and fit_p_value(nominal) >= DOUBTFUL:
         return False
-    found = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    if found.evidence < nominal.evidence + PROMISING or fit_p_value(found) < REJECTED:
+    if gain < PROMISING or fit_p_value(found) < REJECTED:
         return True
     return problem.effects[found.hypothesis[0]].kind in EXPLORED
 

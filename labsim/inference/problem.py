@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from .observations.linearised_drop import ErrorBudget
 from .observations.observe import Observed
 from .observations.tracks import Tracks
 from .observations.undisturbed import Layering, UndisturbedDust
+
+Kind = TypeVar("Kind")  # a class of observations
 
 
 @dataclass
@@ -57,15 +60,21 @@ class Problem:
         assert isinstance(first, Tracks)
         return first
 
+    def find(self, kind: type[Kind]) -> tuple[int, Kind] | None:
+        """Where among the observations the one of a class stands, and itself; None where there is none."""
+        return next(((k, each) for k, each in enumerate(self.observations) if isinstance(each, kind)), None)
+
     @property
     def scans(self) -> list[CompactedZone]:
         """The compacted zones that are compared."""
-        return [zone for each in self.observations if isinstance(each, CompactedZones) for zone in each.zones]
+        found = self.find(CompactedZones)
+        return list(found[1].zones) if found else []
 
     @property
     def layering(self) -> Layering | None:
         """The undisturbed dust of all scans."""
-        return next((each for each in self.observations if isinstance(each, Layering)), None)
+        found = self.find(Layering)
+        return found[1] if found else None
 
     @property
     def undisturbed(self) -> tuple[UndisturbedDust, ...]:

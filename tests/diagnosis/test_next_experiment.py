@@ -88,10 +88,8 @@ def test_a_prediction_is_the_normal_distribution_given_today_s_data(fitted, plan
     parameter = problem.effects["side_friction"].amplitudes[0]
     width, _ = parameter.stand_in(friction.values["side_friction"])
     widths = {"ln_p_m": 30.0, "side_friction": width}
-    blocks = [
-        linear,
-        *friction.blocks[1:],
-    ]  # how far the drops came back up says something of the globals too
+    # how far the drops came back up says something of the globals too
+    blocks = [linear, *friction.blocks[1:]]
     tangents = {name: np.concatenate([block.tangents[name] for block in blocks]) for name in widths}
     joint = block_diag(*(block.covariance for block in blocks)) + sum(
         each**2 * np.outer(tangents[name], tangents[name]) for name, each in widths.items()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 import pytest
@@ -60,7 +59,6 @@ def test_a_film_that_ends_at_the_stop_shows_nothing() -> None:
 
 
 def test_softer_dust_springs_back_further() -> None:
-    @cache
     def find_way(bulk_modulus: float) -> tuple[DropRun, np.ndarray]:
         material = Material(bulk_modulus=bulk_modulus)
         projectile = Projectile("hemisphere", 5e-4, 1.33e-6)

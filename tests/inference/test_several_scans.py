@@ -20,12 +20,12 @@ def twice(tmp_path_factory):
     """Block of one map, and of the same map twice over, about the nominal fit."""
     campaign = read_campaign(laws.write_campaign(tmp_path_factory.mktemp("scans") / "made", scan=True))
     problem, fit = prepare(campaign, laws.LawStore(tmp_path_factory.mktemp("store")), workers=1)
-    [zone] = problem.scans
+    place, known = problem.find(CompactedZones)
+    [zone] = known.zones
     scan = replace(zone.observed.scan, name="C02")
     zones = CompactedZones((zone, replace(zone, observed=replace(zone.observed, scan=scan))))
     names = ["D01", zone.name, scan.name]
     perturbation = Perturbation({}, dict.fromkeys(names, Instrument()), {}, problem.campaign, 1.0)
-    place = [each.kind for each in problem.observations].index("map")
     one = solve_at(problem, ParameterPoint(fit.log_p_m, {}, fit.nuisances)).blocks[place]
     speed = float(fit.nuisances[place][0])
     both = zones.linearise(np.array([speed, speed]), fit.log_p_m, perturbation, ErrorBudget(), {})

@@ -275,8 +275,7 @@ class RunGrid:
             usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
         of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
-        short = group.is_scan or group.pushed or group.felt
-        after_stop = SETTLING if short else LIFTING
+        after_stop = SETTLING if group.is_scan or group.pushed or group.felt else LIFTING
         setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own, after_stop)
         if group.pushed:
             setting = set_push(setting, speed)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,16 @@ OWN, COMMON = 0.15, 0.08  # of the way: of each drop alone, and of drops that ar
 CHANGE = 0.3
 
 
+class LinearisedWay(NamedTuple):
+    """One way about one point. way : m; change : m of it by effects; tangents : name -> by that global; alike : what says which
+    drops are alike (measure_distances)."""
+
+    way: float
+    change: float
+    tangents: Mapping[str, float]
+    alike: tuple[float, float, float]
+
+
 @dataclass(frozen=True)
 class Rebound:
     """One drop that was lifted. way, sigma : m on the stated scale, and the film's noise; features : of its projectile's runs."""
@@ -45,14 +56,35 @@ class Rebound:
     def name(self) -> str:
         return self.drop.name
 
-    def predict(
-        self, log_p_m: float, point: Perturbation, amplitudes: Mapping[str, float]
-    ) -> tuple[float, float]:
-        """The way (m, on the stated scale) that a film should show, and ln of the depth in m."""
-        at = log_p_m + point.log_offsets.get(self.name, 0.0)
-        features = self.features.table.features(at, math.log(self.drop.impact_speed), amplitudes)
-        seen = math.exp(features[0]) / point.instruments[self.name].pixel_factor
-        return features[1] * seen, float(features[0])
+    def linearise(
+        self, log_p_m: float, nominal: Perturbation, perturbations: Mapping[str, Perturbation]
+    ) -> LinearisedWay:
+        """What a film should show about a point."""
+        table, log_speed = self.features.table, math.log(self.drop.impact_speed)
+
+        def see(features: FloatArray, point: Perturbation) -> float:
+            return float(features[1] * (math.exp(features[0]) / point.instruments[self.name].pixel_factor))
+
+        own = log_p_m + nominal.log_offsets.get(self.name, 0.0)
+        response = table.at(own, log_speed)
+        features = response.features(nominal.amplitudes)
+        here = see(features, nominal)
+        stronger = table.features(
+            log_p_m + 1e-2 + nominal.log_offsets.get(self.name, 0.0), log_speed, nominal.amplitudes
+        )
+        tangents = {"ln_p_m": (see(stronger, nominal) - here) / 1e-2}
+        for name, point in perturbations.items():
+            there = log_p_m + point.log_offsets.get(self.name, 0.0)
+            at = response if there == own else table.at(there, log_speed)
+            tangents[name] = (see(at.features(point.amplitudes), point) - here) / point.step
+        projectile = self.drop.drop.projectile
+        radius = projectile.tip_radius
+        alike = (
+            float(features[0]) - math.log(radius),
+            math.log(radius),
+            math.log(projectile.mass / radius**3),
+        )
+        return LinearisedWay(here, here - see(response.plain, nominal), tangents, alike)
 
 
 def measure_rebound(drop: ObservedDrop) -> tuple[float, float] | None:
@@ -87,13 +119,6 @@ class Rebounds(WithoutNuisances):
     def features(self) -> Sequence[RunFeatures]:
         return tuple({each.features.group: each.features for each in self.drops}.values())
 
-    def _predict(
-        self, log_p_m: float, point: Perturbation, amplitudes: Mapping[str, float] | None = None
-    ) -> FloatArray:
-        """(drops, 2) ways (m) and ln of depths, with the amplitudes of the point or others."""
-        amplitudes = point.amplitudes if amplitudes is None else amplitudes
-        return np.array([each.predict(log_p_m, point, amplitudes) for each in self.drops])
-
     def linearise(
         self,
         nuisances: FloatArray,
@@ -102,20 +127,14 @@ class Rebounds(WithoutNuisances):
         budget: ErrorBudget,
         perturbations: Mapping[str, Perturbation],
     ) -> Block:
-        here, depths = self._predict(log_p_m, nominal).T
-        tangents = {"ln_p_m": (self._predict(log_p_m + 1e-2, nominal)[:, 0] - here) / 1e-2}
-        for name, point in perturbations.items():
-            tangents[name] = (self._predict(log_p_m, point)[:, 0] - here) / point.step
-        projectiles = [each.drop.drop.projectile for each in self.drops]
-        alike = measure_distances(
-            [
-                (depth - math.log(p.tip_radius), math.log(p.tip_radius), math.log(p.mass / p.tip_radius**3))
-                for depth, p in zip(depths, projectiles, strict=True)
-            ]
+        parts = [each.linearise(log_p_m, nominal, perturbations) for each in self.drops]
+        here = np.array([part.way for part in parts])
+        changed = np.array([part.change for part in parts])
+        apart = measure_distances([part.alike for part in parts])
+        white = [each.sigma**2 for each in self.drops] + (OWN * here) ** 2 + (CHANGE * changed) ** 2
+        return Block(
+            np.array([each.way for each in self.drops]) - here,
+            np.outer(COMMON * here, COMMON * here) * np.exp(-0.5 * apart) + np.diag(white),
+            {name: np.array([part.tangents[name] for part in parts]) for name in ("ln_p_m", *perturbations)},
+            sections={each.name: slice(k, k + 1) for k, each in enumerate(self.drops)},
         )
-        plain = self._predict(log_p_m, nominal, {})[:, 0]
-        white = [each.sigma**2 for each in self.drops] + (OWN * here) ** 2 + (CHANGE * (here - plain)) ** 2
-        covariance = np.outer(COMMON * here, COMMON * here) * np.exp(-0.5 * alike) + np.diag(white)
-        ways = np.array([each.way for each in self.drops])
-        sections = {each.name: slice(k, k + 1) for k, each in enumerate(self.drops)}
-        return Block(ways - here, covariance, tangents, sections=sections)

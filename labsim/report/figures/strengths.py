@@ -85,7 +85,8 @@ def draw_tests(problem: Problem, fits: Sequence[tuple[str, Fit]], path: Path) ->
 def find_tests(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> tuple[StaticTests | None, list[Block]]:
     """The static tests that drops are compared with, none where there are none, and what each fit says of them: its residuals are
     ln of measured over the law's."""
-    for k, observation in enumerate(problem.observations):
-        if isinstance(observation, StaticTests):
-            return observation, [fit.blocks[k] for _, fit in fits]
-    return None, []
+    found = problem.find(StaticTests)
+    if found is None:
+        return None, []
+    place, tests = found
+    return tests, [fit.blocks[place] for _, fit in fits]

@@ -178,11 +178,10 @@ def describe_misfit(views: Sequence[DropView]) -> dict[str, Any]:
 
 def say_rebounds(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> str:
     """How far drops come back up, measured and by each named fit; empty where no film shows it."""
-    place = next((k for k, each in enumerate(problem.observations) if isinstance(each, Rebounds)), None)
-    if place is None:
+    found = problem.find(Rebounds)
+    if found is None:
         return ""
-    rebounds = problem.observations[place]
-    assert isinstance(rebounds, Rebounds)
+    place, rebounds = found
     ways = np.array([each.way for each in rebounds.drops])
     simulated = [
         f"{1e6 * float(np.mean(ways - fit.blocks[place].residual)):.1f} µm ({label.replace('_', ' ')})"

@@ -39,9 +39,12 @@ class MapView:
 
 def view_maps(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> list[MapView]:
     """Every scan of the likelihood; simulated dust is seen through the scan's own cells, blur and grey level."""
+    found = problem.find(CompactedZones)
+    if found is None:
+        return []
+    number, zones = found
     views = []
-    number = next((k for k, each in enumerate(problem.observations) if isinstance(each, CompactedZones)), 0)
-    for place, scan in enumerate(problem.scans):
+    for place, scan in enumerate(zones.zones):
         observed = scan.observed
         simulated = {}
         for name, fit in fits:

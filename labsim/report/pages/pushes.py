@@ -210,11 +210,10 @@ def say_sleeve(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> str:
     text = (
         f" The sleeve feels {100 * np.median(measured):.2g} % of the net resistance (median of all windows)"
     )
-    place = next((k for k, each in enumerate(problem.observations) if isinstance(each, SleeveFriction)), None)
-    if place is None:
+    found = problem.find(SleeveFriction)
+    if found is None:
         return text + "; that is shown alone, and compared where the record says sleeve = true."
-    sleeves = problem.observations[place]
-    assert isinstance(sleeves, SleeveFriction)
+    place, sleeves = found
     simulated = [
         f"{100 * float(np.median(sleeves.data - fit.blocks[place].residual)):.2g} % ({label.replace('_', ' ')})"
         for label, fit in fits
