@@ -8,7 +8,7 @@ bends, hold_out_folds repeats it without the drops.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,15 +94,18 @@ def _hold_out(
     return drops, pull, precision
 
 
-def weigh_globals(problem: Problem, fit: Fit, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    """What priors and all data but drops say of ln p_m and of effects, about a fit: pull (k,) and precision (k, k)."""
+def weigh_globals(
+    problem: Problem, fit: Fit, names: Sequence[str], without: Collection[int] = (0,)
+) -> tuple[FloatArray, FloatArray]:
+    """What priors and all data say of ln p_m and of effects, about a fit: pull (k,) and precision (k, k). without : places of
+    observations that are left out, the drops where nothing else is said."""
     precision = np.zeros((len(names), len(names)))
     pull = np.zeros(len(names))
     for k, name in enumerate(names[1:], start=1):
         width, _ = problem.effects[name].amplitudes[0].stand_in(fit.values[name])
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
-    for block in fit.blocks[1:]:
+    for block in (block for k, block in enumerate(fit.blocks) if k not in without):
         columns = _stack(block.tangents, names, block.residual.size)
         solved = block.solve(columns)
         precision += columns.T @ solved

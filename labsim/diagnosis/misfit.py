@@ -83,7 +83,7 @@ def compare_regions(zone: CompactedZone, residual: FloatArray, covariance: Float
     residual : (n + 1,) of the cells and the tip's depth; covariance : of both.
     """
     observed = zone.observed
-    found, radius = observed.reduced.map, observed.radius
+    found, radius = observed.map, observed.radius
     r, z = (grid[observed.cells] for grid in np.meshgrid(found.r, found.z))
     below = z < -found.tip_depth
     regions = {

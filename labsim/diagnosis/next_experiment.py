@@ -1,10 +1,10 @@
 """Which further measurement would best tell the remaining causes apart: expected information, in bits.
 
 Each hypothesis still standing predicts every candidate, given today's data: further drops of the projectiles at hand, drops of a
-heavier and of a larger one (planned_drops.py), further pushes. What is expected of a measurement is the weight of evidence that
-it gives the true hypothesis against all others, Σ p_j ln [p(y|j) / Σ_k w_k p(y|k)], w_k = p_k / (1 - p_j) (Good 1950): it goes
-on growing where all is decided. From below, with the Kullback-Leibler divergences D_jk of normal distributions:
--Σ p_j ln Σ_k w_k exp(-D_jk) (Hershey & Olsen 2007).
+heavier and of a larger one, drops without what can be taken away (planned_drops.py), CT scans (planned_scans.py), further pushes.
+What is expected of a measurement is the weight of evidence that it gives the true hypothesis against all others,
+Σ p_j ln [p(y|j) / Σ_k w_k p(y|k)], w_k = p_k / (1 - p_j) (Good 1950): it goes on growing where all is decided. From below, with
+the Kullback-Leibler divergences D_jk of normal distributions: -Σ p_j ln Σ_k w_k exp(-D_jk) (Hershey & Olsen 2007).
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from ..errors import ExtrapolationError
 from ..inference.fits.fitting import Fit
 from ..inference.problem import Problem
 from ..records import FloatArray
-from .planned_drops import Prediction, plan_drops, predict_planned
+from .planned_drops import Prediction, plan_drops, predict_drops
+from .planned_scans import plan_scans, predict_scans
 
 SEEN_BY_SPEED = (
     0.01  # of ln resistance, between the slowest and the fastest push: less is no cause that speed shows
@@ -74,30 +75,37 @@ def suggest(
     weight = np.array([probabilities[fit.hypothesis or ("none",)] for fit in standing])
     weight /= weight.sum()
     if any(not (group.is_scan or group.pushed) for group in problem.groups):
-        found += _suggest_drops(problem, standing, weight)
+        found += _suggest_planned(problem, standing, weight)
     worth = [each for each in found if each.information_bits >= WORTHWHILE]
     return sorted(worth, key=lambda each: -each.information_bits)[:MOST]
 
 
-def _suggest_drops(problem: Problem, standing: list[Fit], weight: FloatArray) -> list[Suggestion]:
+def _suggest_planned(problem: Problem, standing: list[Fit], weight: FloatArray) -> list[Suggestion]:
+    """Planned drops and CT scans, the best of those that differ in speed alone; what needs runs of its own only where the first
+    is not certain."""
     order = np.argsort(-weight, kind="stable")
-    first = standing[order[0]]
-    for others in (True, False) if weight.max() < CERTAIN else (False,):
-        try:
-            extended, planned = plan_drops(problem, first, other_projectiles=others)
-            by_fit = [predict_planned(problem, extended, fit) for fit in standing]
-            break
-        except ExtrapolationError:  # no run of the other projectiles comes to rest
-            if not others:
-                raise
-    found = []
-    for (text, _), predictions in zip(planned, zip(*by_fit, strict=True), strict=True):
-        bits = expected_weight(
-            [each.mean for each in predictions], [each.spread for each in predictions], weight
-        )
-        said = tuple((" + ".join(standing[k].hypothesis) or "none", predictions[k]) for k in order)
-        found.append(Suggestion(text, round(bits, 3), predictions=said))
-    return found
+    ordered = [standing[k] for k in order]
+    best: dict[str, Suggestion] = {}
+    for plan, predict in ((plan_drops, predict_drops), (plan_scans, predict_scans)):
+        for new in (True, False) if weight.max() < CERTAIN else (False,):
+            try:
+                extended, planned = plan(problem, ordered, new=new)
+                by_fit = predict(problem, extended, ordered) if planned else []
+                break
+            except ExtrapolationError:  # no run of what is new comes to rest
+                if not new:
+                    raise
+        for (what, fast), predictions in zip(planned, zip(*by_fit, strict=True), strict=True):
+            bits = expected_weight(
+                [each.mean for each in predictions], [each.spread for each in predictions], weight[order]
+            )
+            said = tuple(
+                (" + ".join(fit.hypothesis) or "none", each)
+                for fit, each in zip(ordered, predictions, strict=True)
+            )
+            if what not in best or bits > best[what].information_bits:
+                best[what] = Suggestion(f"{what} {fast}", round(bits, 3), predictions=said)
+    return list(best.values())
 
 
 def _suggest_pushes(

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import copy
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +21,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ..inference.emulation.curves import extract_curve
 from ..inference.emulation.forward import Instant, ResponseTable
 from ..inference.emulation.grid import ProjectileGroup, sparse_positions, speed_nodes
+from ..inference.fits.blocks import Block
 from ..inference.fits.fitting import Fit, require_runs
 from ..inference.fits.tangents import linearise_at
 from ..inference.observations import RunFeatures
@@ -37,41 +40,68 @@ ALIKE = 1.3  # factor in radius, or in mass over its cube, within which a projec
 
 
 @dataclass(frozen=True)
-class Prediction:
-    """Of one planned drop by one hypothesis. mean : (n,) m, spread : (n, n) of its rows in the dust, where the free fall above is
-    seen as planned; depth, depth_sigma : m; stop : s."""
+class Prediction(ABC):
+    """Of one planned measurement by one hypothesis: mean (n,) and covariance (n, n) of its data."""
 
     mean: FloatArray
     spread: FloatArray
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """What a person would look for, in the units of the laboratory."""
+
+    @abstractmethod
+    def summarise(self) -> dict[str, float]:
+        """The same as numbers, units in their names."""
+
+
+@dataclass(frozen=True)
+class DropPrediction(Prediction):
+    """Of one drop: m, of its rows in the dust, where the free fall above is seen as planned; depth, depth_sigma : m; stop : s."""
+
     depth: float
     depth_sigma: float
     stop: float
 
     @property
     def text(self) -> str:
-        """Depth and stopping time in the units of the laboratory."""
         return f"{self.depth * 1e3:.3f} ± {self.depth_sigma * 1e3:.3f} mm in {self.stop * 1e3:.2f} ms"
+
+    def summarise(self) -> dict[str, float]:
+        return {
+            "depth_mm": self.depth * 1e3,
+            "depth_sd_mm": self.depth_sigma * 1e3,
+            "stopping_time_ms": self.stop * 1e3,
+        }
 
 
 def plan_drops(
-    problem: Problem, fit: Fit, *, other_projectiles: bool
-) -> tuple[Problem, list[tuple[str, DropModel]]]:
-    """The problem with drops beside those that were made, and what each of them would be, in words.
+    problem: Problem, standing: Sequence[Fit], *, new: bool
+) -> tuple[Problem, list[tuple[str, str]]]:
+    """The problem with drops beside those that were made, and what each of them would be, in words, and how fast.
 
-    fit : whose depth and stop say when the camera looks. other_projectiles : a heavier and a larger one too, which need runs.
-    Nothing of ``problem`` is changed.
+    standing : hypotheses, the most probable first, whose depth and stop say when the camera looks. new : a heavier and a larger
+    projectile too, which need runs. Nothing of ``problem`` is changed.
     """
-    tracks = copy.deepcopy(problem.tracks)
+    tracks, first = copy.deepcopy(problem.tracks), standing[0]
     groups, features = list(problem.groups), list(tracks.features)
-    planned: list[tuple[str, int, float]] = []
+    tables = {each.group: each.table for each in reversed(features)}  # of the curve, the first of a group
+    planned: list[tuple[str, int, float, ResponseTable]] = []
     for number, group in enumerate(problem.groups):
-        if not (group.is_scan or group.pushed):
-            planned += [("one more drop with", number, speed) for speed in group.speeds[1:]]
-    for projectile, speed in _list_others(problem) if other_projectiles else []:
+        if group.is_scan or group.pushed:
+            continue
+        planned += [("one more drop with", number, speed, tables[number]) for speed in group.speeds[1:]]
+        for name in sorted({name for fit in standing for name in fit.hypothesis}):
+            if group is find_usual(problem) and (way := problem.effects[name].without):
+                table = replace(tables[number], absent=frozenset({name}))
+                planned += [(f"a drop {way}, with", number, speed, table) for speed in group.speeds[1:]]
+    for projectile, speed in _list_others(problem) if new else []:
         nodes = speed_nodes(speed, speed)
         sparse = sparse_positions(nodes, False)
-        features.append(RunFeatures(len(groups), ResponseTable(np.log(nodes), sparse), extract_curve))
-        planned.append(("a drop with another projectile,", len(groups), speed))
+        table = ResponseTable(np.log(nodes), sparse)
+        features.append(RunFeatures(len(groups), table, extract_curve))
+        planned.append(("a drop with another projectile,", len(groups), speed, table))
         groups.append(ProjectileGroup(projectile, nodes, False, sparse))
     extended = replace(
         problem,
@@ -81,77 +111,99 @@ def plan_drops(
         _filled=set(problem._filled),
         _plain=dict(problem._plain),
     )
-    require_runs(extended, fit)
+    require_runs(extended, first)
     last = max(problem.campaign.drops, key=lambda drop: drop.sequence)
     drops, places = list(problem.campaign.drops), dict(problem.places)
-    models: list[tuple[str, DropModel]] = []
-    for words, number, speed in planned:
+    models: list[DropModel] = []
+    said = []
+    for words, number, speed, table in planned:
         projectile = groups[number].projectile
-        table = next(each.table for each in features if each.group == number)
         name = f"planned {len(models) + 1}"
-        stop = math.exp(table.features(fit.log_p_m, math.log(speed), fit.values)[1])
+        stop = math.exp(table.features(first.log_p_m, math.log(speed), first.values)[1])
         seen = _plan_film(problem, name, projectile, stop)
-        text = (
-            f"{words} the {2e3 * projectile.tip_radius:.3g} mm tip of {projectile.mass * 1e6:.3g} mg at {speed:.2f} m/s "
-            f"(height {speed**2 / 2 / STANDARD_GRAVITY * 1e3:.1f} mm)"
+        said.append(
+            (
+                f"{words} {name_tip(projectile)}",
+                f"at {speed:.2f} m/s (height {speed**2 / 2 / STANDARD_GRAVITY * 1e3:.1f} mm)",
+            )
         )
         start = Instant(0.0, math.log(speed), 0.0)
-        models.append((text, DropModel(seen, table, start, np.eye(seen.time.size))))
+        models.append(DropModel(seen, table, start, np.eye(seen.time.size)))
         drops.append(seen.drop)
         places[name] = replace(places[last.name], name=name, tip=projectile.tip)
     return replace(
         extended,
         campaign=replace(problem.campaign, drops=tuple(drops)),
         places=places,
-        observations=(
-            replace(extended.tracks, models=(*extended.tracks.models, *(model for _, model in models))),
-        ),
-    ), models
+        observations=(replace(extended.tracks, models=(*extended.tracks.models, *models)),),
+    ), said
 
 
-def predict_planned(problem: Problem, extended: Problem, fit: Fit) -> list[Prediction]:
-    """What a fit predicts of every planned drop of ``extended``, given the data that it was fitted to."""
-    require_runs(extended, fit)
+def predict_drops(problem: Problem, extended: Problem, standing: Sequence[Fit]) -> list[list[Prediction]]:
+    """What each fit predicts of every planned drop of ``extended``, given the data that it was fitted to."""
     made, models = len(problem.tracks.models), extended.tracks.models
     starts = np.array([model.start for model in models[made:]])
-    (linear,) = linearise_at(extended, (np.vstack([fit.nuisances[0], starts]),), fit.log_p_m, fit.values)
-    names = ["ln_p_m", *fit.hypothesis]
-    design = np.stack([linear.tangents[name] for name in names], axis=1)
-    seen = np.arange(linear.residual.size) < linear.sections[models[made].observed.name].start
-    pull, precision = weigh_globals(problem, fit, names)
-    factor = cho_factor(linear.covariance[np.ix_(seen, seen)], lower=True)
-    solved = cho_solve(factor, design[seen])
-    covariance = np.linalg.inv(design[seen].T @ solved + precision)
-    best = covariance @ (solved.T @ linear.residual[seen] + pull)
-    left = cho_solve(factor, linear.residual[seen] - design[seen] @ best)
-    offsets, instruments = extended.log_offsets(fit.values), extended.instruments(fit.values)
-    found = []
-    for model in models[made:]:
-        assert isinstance(model, DropModel)
-        name = model.observed.name
-        own = linear.sections[name]
-        cross = linear.covariance[own][:, seen]
-        reach = design[own] - cross @ solved
-        # the data are nought: what is left of them is the simulation's rows, downwards
-        mean = design[own] @ best + cross @ left - linear.residual[own]
-        spread = linear.covariance[own, own] - cross @ cho_solve(factor, cross.T)
-        spread = spread + reach @ covariance @ reach.T
-        features = model.table.features(fit.log_p_m + offsets[name], model.start.log_speed, fit.values)
-        time, speed = model.observed.time, math.exp(model.start.log_speed)
-        falls = time < 0.0
-        fall = time[falls] * (speed + 0.5 * STANDARD_GRAVITY * time[falls])
-        mean, spread = _condition(mean, spread, falls, fall)
-        deepest = int(np.argmax(mean))
-        found.append(
-            Prediction(
-                mean,
-                spread,
-                float(mean[deepest]),
-                math.sqrt(spread[deepest, deepest]),
-                math.exp(features[1]) * instruments[name].rate_factor,
+    linear = []
+    for fit in standing:
+        require_runs(extended, fit)
+        nuisances = np.vstack([fit.nuisances[0], starts])
+        linear.append(linearise_at(extended, (nuisances,), fit.log_p_m, fit.values)[0])
+    sections = linear[0].sections
+    first = sections[models[made].observed.name].start
+    seen = np.arange(linear[0].residual.size) < first
+    found: list[list[Prediction]] = []
+    for fit, block in zip(standing, linear, strict=True):
+        mean, spread = predict_rows(problem, fit, {0: block}, seen, linear[0].covariance)
+        offsets, instruments = extended.log_offsets(fit.values), extended.instruments(fit.values)
+        found.append([])
+        for model in models[made:]:
+            assert isinstance(model, DropModel)
+            name = model.observed.name
+            rows = slice(sections[name].start - first, sections[name].stop - first)
+            features = model.table.features(fit.log_p_m + offsets[name], model.start.log_speed, fit.values)
+            time, speed = model.observed.time, math.exp(model.start.log_speed)
+            falls = time < 0.0
+            fall = time[falls] * (speed + 0.5 * STANDARD_GRAVITY * time[falls])
+            depth, error = _condition(mean[rows], spread[rows, rows], falls, fall)
+            deepest = int(np.argmax(depth))
+            found[-1].append(
+                DropPrediction(
+                    depth,
+                    error,
+                    float(depth[deepest]),
+                    math.sqrt(error[deepest, deepest]),
+                    math.exp(features[1]) * instruments[name].rate_factor,
+                )
             )
-        )
     return found
+
+
+def predict_rows(
+    problem: Problem, fit: Fit, blocks: Mapping[int, Block], seen: np.ndarray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Mean (n,) and covariance (n, n) of rows that nobody has measured yet, whose data are nought, given all data of a fit.
+
+    blocks : by their place among the problem's observations, with those rows beside the measured ones; a place of its own where
+    there was nothing of that kind. seen : (rows,) bool, of all blocks together, which were measured. covariance : (rows, rows) of
+    their errors, the same for all fits: that two causes have errors of another shape is no evidence.
+    """
+    names = ["ln_p_m", *fit.hypothesis]
+    design = np.concatenate([np.stack([each.tangents[n] for n in names], axis=1) for each in blocks.values()])
+    residual = np.concatenate([each.residual for each in blocks.values()])
+    pull, precision = weigh_globals(problem, fit, names, blocks)
+    weights = np.zeros((np.count_nonzero(~seen), np.count_nonzero(seen)))
+    if seen.any():
+        factor = cho_factor(covariance[np.ix_(seen, seen)], lower=True)
+        solved = cho_solve(factor, design[seen])
+        pull, precision = pull + solved.T @ residual[seen], precision + design[seen].T @ solved
+        weights = cho_solve(factor, covariance[np.ix_(seen, ~seen)]).T
+    of_globals = np.linalg.inv(precision)
+    best = of_globals @ pull
+    reach = design[~seen] - weights @ design[seen]
+    # the data are nought: what is left of them is the simulation's rows, downwards
+    mean = design[~seen] @ best + weights @ (residual[seen] - design[seen] @ best) - residual[~seen]
+    spread = covariance[np.ix_(~seen, ~seen)] - weights @ covariance[np.ix_(seen, ~seen)]
+    return mean, spread + reach @ of_globals @ reach.T
 
 
 def _condition(
@@ -165,14 +217,25 @@ def _condition(
     )
 
 
+def name_tip(projectile: Projectile) -> str:
+    """The projectile in words."""
+    return f"the {2e3 * projectile.tip_radius:.3g} mm tip of {projectile.mass * 1e6:.3g} mg"
+
+
+def find_usual(problem: Problem) -> ProjectileGroup | None:
+    """The group of most drops; None where none was made."""
+    groups = [group for group in problem.groups if not (group.is_scan or group.pushed)]
+    drops = [drop.projectile.simulated for drop in problem.campaign.drops]
+    return max(groups, key=lambda group: drops.count(group.projectile), default=None)
+
+
 def _list_others(problem: Problem) -> list[tuple[Projectile, float]]:
     """A projectile HEAVIER, and one LARGER of the same density, than that of most drops, where there is none like it; and the
     speed (m/s) at which it goes about as deep in its radii as that one at its middle speed."""
     groups = [group for group in problem.groups if not (group.is_scan or group.pushed)]
-    if not groups:
+    usual = find_usual(problem)
+    if usual is None:
         return []
-    drops = [drop.projectile.simulated for drop in problem.campaign.drops]
-    usual = max(groups, key=lambda group: drops.count(group.projectile))
     middle = usual.speeds[len(usual.speeds) // 2]
     one = usual.projectile
     heavier = replace(one, mass=HEAVIER * one.mass)

@@ -1,7 +1,7 @@
 """What an effect is: the records that its file is made of and is called with.
 
 An effect is a file with module-level names (docs/effects-writing.md has them in a table): title, kind, parameters, leaves,
-references, expect, says, needs, remedy, applies(campaign) and at least one of change_setting(setting, values, place) and
+references, expect, says, needs, remedy, without, applies(campaign) and at least one of change_setting(setting, values, place) and
 change_instrument(instrument, values, place). Every effect is a nested extension of the nominal model: at the null of its
 parameters it changes nothing, bit for bit.
 """
@@ -220,6 +220,7 @@ class Effect:
         ""  # what to do about it; {value} is its first parameter. Where it says nothing, its kind does
     )
 
+    without: str = ""  # how a drop is made where it is not at work, as it stands after "a drop"
     says: tuple[str, str] | None = (
         None  # the title where the first parameter lies below its null, and above it
     )

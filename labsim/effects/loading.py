@@ -205,6 +205,13 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
             f"{remedy!r} is not a sentence; write text, in which {{value}} is the first parameter",
         ) from None
 
+    without = getattr(module, "without", "")
+    if not isinstance(without, str):
+        raise EffectError(
+            file,
+            "without",
+            f'{without!r} is not text; write how a drop is made without it, "in a deeper sample"',
+        )
     says = getattr(module, "says", None)
     if says is not None and not (
         isinstance(says, tuple)
@@ -245,6 +252,7 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
         resolve=resolve,
         description=inspect.cleandoc(module.__doc__ or ""),
         remedy=remedy,
+        without=without,
         says=says,
         reshape=_function(file, module, "reshape", 2),
     )

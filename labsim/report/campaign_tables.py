@@ -221,13 +221,7 @@ def campaign_diagnosis_summary(found: Diagnosis) -> dict[str, Any]:
                 "change": each.text,
                 "information_bits": each.information_bits,
                 "predictions": [
-                    {
-                        "cause": cause,
-                        "depth_mm": expected.depth * 1e3,
-                        "depth_sd_mm": expected.depth_sigma * 1e3,
-                        "stopping_time_ms": expected.stop * 1e3,
-                    }
-                    for cause, expected in each.predictions
+                    {"cause": cause, **expected.summarise()} for cause, expected in each.predictions
                 ],
             }
             for each in found.suggestions

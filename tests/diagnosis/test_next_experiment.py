@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 
 from labsim.campaign import read_campaign
 from labsim.diagnosis.next_experiment import expected_weight, suggest
-from labsim.diagnosis.planned_drops import HEAVIER, LARGER, plan_drops, predict_planned
+from labsim.diagnosis.planned_drops import HEAVIER, LARGER, plan_drops, predict_drops
 from labsim.effects import list_effects
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.fits.tangents import linearise_at
@@ -31,6 +31,7 @@ def fitted(shared_store) -> tuple[Problem, Fit, Fit]:
     drops = tuple(drop for drop in CAMPAIGN.drops if drop.name in ("D01", "D02", "D03", "D05", "D06", "D07"))
     campaign = replace(CAMPAIGN, drops=drops, scans=())
     chosen = {name: list_effects(campaign)[name] for name in ("pixel_scale", "side_friction")}
+    chosen["side_friction"] = replace(chosen["side_friction"], without="with a waisted rod")
     problem = open_problem(
         campaign, RunStore(shared_store), chosen, workers=1, drops=observe_drops(campaign)[0], cells=4
     )
@@ -43,8 +44,9 @@ def fitted(shared_store) -> tuple[Problem, Fit, Fit]:
 def planned(fitted):
     problem, nominal, friction = fitted
     before = {name: len(table) for name, table in list_tables(problem)}
-    extended, drops = plan_drops(problem, nominal, other_projectiles=True)
-    predictions = [predict_planned(problem, extended, fit) for fit in (nominal, friction)]
+    extended, texts = plan_drops(problem, [nominal, friction], new=True)
+    drops = list(zip(map(" ".join, texts), extended.tracks.models[6:], strict=True))
+    predictions = [predict_drops(problem, extended, [fit])[0] for fit in (nominal, friction)]
     assert {name: len(table) for name, table in list_tables(problem)} == before
     assert len(problem.tracks.models) == 6 and len(problem.places) == 6 and len(problem.campaign.drops) == 6
     return extended, drops, predictions
@@ -61,12 +63,14 @@ def test_every_planned_drop_goes_as_deep_as_a_run_of_it(fitted, planned) -> None
     extended, drops, (predictions, _) = planned
     (usual,) = problem.groups
     radii = [model.radius for _, model in drops]
-    assert len(drops) == len(usual.speeds) - 1 + 2 and max(radii) == LARGER * usual.projectile.tip_radius
+    assert (
+        len(drops) == 2 * (len(usual.speeds) - 1) + 2 and max(radii) == LARGER * usual.projectile.tip_radius
+    )
     masses = [model.observed.drop.projectile.mass for _, model in drops]
     assert sorted({round(mass / usual.projectile.mass) for mass in masses}) == [1, HEAVIER, LARGER**3]
     for k in (0, len(drops) - 2, len(drops) - 1):
         text, model = drops[k]
-        number = next(n for n, each in enumerate(extended.features) if each.table is model.table)
+        number = next(each.group for each in extended.features if each.table is model.table)
         speed = math.exp(model.start.log_speed)
         assert f"{speed:.2f} m/s" in text
         setting = extended.grid.setting(extended.groups[number], speed, math.exp(nominal.log_p_m))
@@ -115,6 +119,24 @@ def test_a_prediction_is_the_normal_distribution_given_today_s_data(fitted, plan
     assert np.sqrt(np.diag(predictions[0].spread)) == pytest.approx(np.sqrt(np.diag(spread)), rel=0.01)
 
 
+def test_a_drop_without_the_cause_is_a_drop_of_the_nominal_model(fitted, planned) -> None:
+    _, nominal, friction = fitted
+    extended, drops, (of_nominal, of_friction) = planned
+    speeds = len(drops) // 2 - 1
+    for k in range(speeds):
+        (_, usual), (text, without) = drops[k], drops[speeds + k]
+        assert text.startswith("a drop with a waisted rod, with the 1 mm tip")
+        assert without.start == usual.start and without.table.base is usual.table.base
+        # it tells nothing new of the hypothesis that does not know the cause
+        assert of_nominal[speeds + k].mean == pytest.approx(of_nominal[k].mean, rel=1e-9)
+        plain = usual.table.features(friction.log_p_m, usual.start.log_speed, {})
+        at_work = usual.table.features(friction.log_p_m, usual.start.log_speed, friction.values)
+        deeper = math.exp(plain[0]) - math.exp(at_work[0])
+        gone = of_friction[speeds + k].depth - of_friction[k].depth
+        assert gone == pytest.approx(deeper, rel=0.1) and deeper > 1.5e-3 * math.exp(plain[0])
+    assert friction.log_p_m < nominal.log_p_m and extended.tracks.models[-1].radius > 0.0
+
+
 def test_suggestions_say_what_each_cause_predicts(fitted) -> None:
     problem, nominal, friction = fitted
     found = suggest(problem, [nominal, friction], {("none",): 0.4, ("side_friction",): 0.6})
@@ -123,6 +145,11 @@ def test_suggestions_say_what_each_cause_predicts(fitted) -> None:
     assert names == ("side_friction", "none")
     assert all(0.0 < each.depth_sigma < 0.1 * each.depth for each in predictions)
     assert all(5e-4 < each.stop < 2e-2 for each in predictions)
+    # of drops that differ in speed alone the best is told
+    kinds = [each.change.split(" at ")[0] for each in found]
+    assert (
+        len(set(kinds)) == len(kinds) and "a drop with a waisted rod, with the 1 mm tip of 1.33 mg" in kinds
+    )
     # where the first is certain no other projectile is asked for
     sure = suggest(problem, [nominal, friction], {("none",): 0.02, ("side_friction",): 0.98})
     assert not any("another projectile" in each.change for each in sure)
@@ -133,7 +160,7 @@ def test_the_same_hypothesis_about_another_point_tells_nothing(fitted, planned) 
     """A model that is linear has one prediction, wherever it is taken for a straight line."""
     problem, nominal, _ = fitted
     extended, _, (here, _) = planned
-    there = predict_planned(problem, extended, replace(nominal, log_p_m=nominal.log_p_m + 0.02))
+    (there,) = predict_drops(problem, extended, [replace(nominal, log_p_m=nominal.log_p_m + 0.02)])
     for one, other in zip(here, there, strict=True):
         assert expected_weight([one.mean, other.mean], [one.spread, other.spread], EVEN) < 0.2
 

@@ -74,7 +74,7 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             deepest = max([deepest, *depths])
         elif isinstance(observation, CompactedZones):
             observed = [zone.observed for zone in observation.zones]
-            deepest = max([deepest, *(each.reduced.map.tip_depth / each.radius for each in observed)])
+            deepest = max([deepest, *(each.map.tip_depth / each.radius for each in observed)])
             fastest = max(fastest, math.exp(float(nuisances.max())))
     laws = []
     for place in LAW_PLACES.values():

@@ -37,6 +37,7 @@ leaves = (
     "where the tip comes within half its radius of the floor."
 )
 remedy = "use a deeper sample, or slower drops: the bottom is felt {value:.4g} m below the surface"
+without = "in a deeper sample"
 references = ("Seguin, Bertho & Gondret (2008): influence of confinement on granular penetration by impact",)
 expect = {"penetration_depth": 1}
 

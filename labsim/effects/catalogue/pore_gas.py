@@ -25,6 +25,7 @@ leaves = (
     "Resistance that grows with compaction and springs back: rebound, less dust above φ = 0.2 for the same depth, and a "
     "different change of depth with speed. It goes away when the chamber is pumped longer."
 )
+without = "in a chamber that is pumped out for longer"
 references = (
     "Royer et al. (2007): gas in granular impact",
     "Ideal gas at constant temperature in the pore volume 1 - φ",

@@ -43,6 +43,7 @@ leaves = (
     "than large ones. The CT shows it beside the bead if its voxels are finer than the crust."
 )
 remedy = "take the crust off, or keep it in the model: labsim simulate --model model.toml"
+without = "where the top of the sample is taken off"
 references = (
     "Weidling, Güttler, Blum & Brauer (2009): compaction of surfaces by handling and repeated impact",
 )

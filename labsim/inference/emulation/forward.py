@@ -30,7 +30,7 @@ class ResponseTable:
     """Features of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds.
     fingerprints : the same at the few speeds, taken where there are no changes. parameters : of effects whose amplitudes
-    have a grade of their own."""
+    have a grade of their own. absent : effects that are not at work in what the table stands for."""
 
     log_speeds: FloatArray
     sparse: tuple[int, ...]
@@ -38,6 +38,7 @@ class ResponseTable:
     changes: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
+    absent: frozenset[str] = frozenset()
     _stacks: dict[int, tuple[Mapping[float, FloatArray], FloatArray]] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -89,7 +90,8 @@ class Response:
         """The features (m,) with effects; that of ``plain`` itself where none of them has runs in the table."""
         features = self.plain
         for name, amplitude in amplitudes.items():
-            if amplitude != 0.0 and (name in self.table.changes or name in self.table.fingerprints):
+            known = name in self.table.changes or name in self.table.fingerprints
+            if amplitude != 0.0 and known and name not in self.table.absent:
                 features = features + self.change(name, amplitude)
         return features
 

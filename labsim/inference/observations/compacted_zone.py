@@ -46,12 +46,15 @@ REACH = 0.2
 
 @dataclass(frozen=True)
 class ObservedScan:
-    """Cells of a map that are compared. cells : (nz, nr) which; filling_factor, sigma : (n,); undisturbed : of the whole
-    scan; beside : (n,) filling factor of the undisturbed dust at the depth of each cell, which crusts and gradients change."""
+    """Cells of a map that are compared. point_spread : m, that the scan itself shows; correlation : of noise between cells that
+    are neighbours along r and along z; cells : (nz, nr) which; filling_factor, sigma : (n,); undisturbed : of the whole scan;
+    beside : (n,) filling factor of the undisturbed dust at the depth of each cell, which crusts and gradients change."""
 
     scan: Scan
-    reduced: ReducedScan
-    cells: Bool[np.ndarray, "nz nr"]  # (nz, nr) bool
+    map: FillingMap
+    point_spread: float
+    correlation: tuple[float, float]
+    cells: Bool[np.ndarray, "nz nr"]
     filling_factor: Float[np.ndarray, " n"]
     sigma: Float[np.ndarray, " n"]
     undisturbed: float
@@ -68,15 +71,14 @@ class ObservedScan:
     @cached_property
     def noise(self) -> FloatArray:
         """(n, n) covariance of the map's own noise, correlated between neighbours."""
-        errors = self.reduced.errors
-        near_r, near_z = (np.clip(c, 0.0, 0.95) for c in (errors.correlation_r, errors.correlation_z))
+        near_r, near_z = (np.clip(c, 0.0, 0.95) for c in self.correlation)
         apart_r, apart_z = self._apart()
         return np.asarray(np.outer(self.sigma, self.sigma) * near_r**apart_r * near_z**apart_z)
 
     @cached_property
     def about_tip(self) -> FloatArray:
         """(n, 2) places of the cells from the lowest point of the bead, in tip radii."""
-        found = self.reduced.map
+        found = self.map
         r, z = (grid[self.cells] for grid in np.meshgrid(found.r, found.z))
         return np.stack([r, z + found.tip_depth], axis=1) / self.radius
 
@@ -97,7 +99,9 @@ def observe_scan(reduced: ReducedScan) -> ObservedScan:
     beside = np.full(r.shape, level) if dust is None else np.interp(-z, dust.depth, dust.filling_factor)
     return ObservedScan(
         reduced.scan,
-        reduced,
+        found,
+        reduced.point_spread,
+        (reduced.errors.correlation_r, reduced.errors.correlation_z),
         cells,
         found.filling_factor[cells],
         np.maximum(found.sigma[cells], 1e-4),
@@ -132,8 +136,7 @@ def see_dust(
 
 def extract_map(run: DropRun | Compaction, observed: ObservedScan) -> FloatArray:
     """(1 + n,): ln D and the filling factor on the compared cells, through the point spread that the scan itself shows."""
-    reduced = observed.reduced
-    seen = see_dust(run, reduced.map, reduced.point_spread, masked=~observed.cells)
+    seen = see_dust(run, observed.map, observed.point_spread, masked=~observed.cells)
     return np.concatenate([[math.log(run.penetration_depth)], seen[observed.cells]])
 
 
@@ -185,7 +188,7 @@ class CompactedZone:
     ) -> LinearisedZone:
         """Residual, errors and tangents."""
         observed = self.observed
-        found = observed.reduced.map
+        found = observed.map
         amplitudes, instrument = nominal.amplitudes, nominal.instruments[observed.name]
         response = self.table.at(log_p_m, log_speed)
 
@@ -333,5 +336,5 @@ class CompactedZones:
 def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:
     full = np.full(observed.cells.shape, np.nan)
     full[observed.cells] = cells
-    slope = np.gradient(full, observed.reduced.map.z, axis=0)
+    slope = np.gradient(full, observed.map.z, axis=0)
     return np.nan_to_num(slope[observed.cells])

@@ -53,7 +53,7 @@ def view_maps(problem: Problem, fits: Sequence[tuple[str, Fit]]) -> list[MapView
             full = np.full(observed.cells.shape, np.nan)
             full[observed.cells] = scale * features[1:]
             simulated[name] = full
-        views.append(MapView(observed.name, observed.reduced.map, observed.undisturbed, simulated))
+        views.append(MapView(observed.name, observed.map, observed.undisturbed, simulated))
     return views
 
 
