@@ -19,6 +19,7 @@ from itertools import cycle
 import numpy as np
 
 from benchmarks.campaigns.labelled import format_toml
+from benchmarks.campaigns.scan import VOXEL
 from labsim.effects import Effect, list_effects
 
 P_M, SCATTER, NOISE_SLOPE = (700.0, 2500.0), (0.01, 0.10), 0.5
@@ -114,7 +115,7 @@ def draw_listed(effect: Effect, rng: np.random.Generator) -> dict:
             break
     table, key = LISTED[name]
     if name == "ct_blur":
-        value *= 1e3
+        value = 1e3 * (VOXEL + value)
     keys: dict = {key: value}
     shapes = [each for each in effect.parameters if each.shape]
     if shapes:

@@ -89,7 +89,7 @@ def measure_hidden(
         level = instrument.stated_filling_factor(initial_filling_factor(setting, depth))
         seen = level + laboratory.dust * rng.standard_normal(depth.size)
         blur = scan.voxel * math.exp(laboratory.point_spread * rng.standard_normal())
-        spread = math.hypot(blur, instrument.ct_blur)
+        spread = blur + instrument.ct_blur
         dust.append(UndisturbedDust(scan, depth, seen, np.full(depth.size, ROW_NOISE), spread))
     maps = [_scan(truth, hidden, template, rng, laboratory) for template in truth.templates]
     return Measurements(judge_noise(drops), maps, dust)
@@ -116,7 +116,7 @@ def _scan(
     frame = replace(template.map, z=template.map.z - (tip - template.map.tip_depth), tip_depth=tip)
     seen = features[1:].reshape(frame.filling_factor.shape) * instrument.ct_scale
     noise = laboratory.maps * np.nan_to_num(frame.sigma) * rng.standard_normal(seen.shape)
-    blur = math.hypot(template.point_spread, instrument.ct_blur)
+    blur = template.point_spread + instrument.ct_blur
     return replace(template, map=replace(frame, filling_factor=seen + noise), blur=blur)
 
 

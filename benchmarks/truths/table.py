@@ -261,7 +261,7 @@ def _table(speeds: Sequence[float]) -> ResponseTable:
 
 def _extract_map(template: ReducedScan, blur: float, run: DropRun) -> FloatArray:
     """(1 + cells,): ln D and the filling factor on the template's cells, the deepest tip where the template's bead ends."""
-    seen = see_dust(run, template.map, math.hypot(template.point_spread, blur))
+    seen = see_dust(run, template.map, template.point_spread + blur)
     return np.concatenate([[math.log(run.penetration_depth)], seen.ravel()])
 
 

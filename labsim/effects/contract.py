@@ -157,9 +157,7 @@ class Instrument:
     )
     clock_drift: float = 0.0  # 1/s, share by which the time between frames grows in a second from contact on
     ct_scale: float = 1.0  # true over stated grey level per density
-    ct_blur: float = (
-        0.0  # m, standard deviation of additional point spread, in quadrature with the assumed one
-    )
+    ct_blur: float = 0.0  # m, by which the standard deviation of the point spread is larger than assumed
 
     gauge_shift: float = (
         0.0  # Pa of the tip's section that a force gauge reads too much at the start of a push

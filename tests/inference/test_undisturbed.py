@@ -79,7 +79,7 @@ def test_tangents_are_the_exact_differences(campaign, drops, tmp_path):
     assert block.tangents["ct_scale"][:-1] == pytest.approx(np.full(DEPTH.size, 0.15), rel=1e-9)
     assert np.all(block.tangents["ln_p_m"] == 0)
     wide = linearise_dust(problem, {"ct_blur": 2 * problem.undisturbed[0].scan.voxel}, {})
-    assert wide.residual[-1] - block.residual[-1] == pytest.approx(-0.5 * math.log(5.0), rel=1e-9)
+    assert wide.residual[-1] - block.residual[-1] == pytest.approx(-math.log(3.0), rel=1e-9)
 
 
 def test_the_length_of_a_crust_is_taken_from_the_scans(campaign, drops, tmp_path):

@@ -1,6 +1,8 @@
-"""The point spread of the CT is wider than assumed: an additional Gaussian of this standard deviation, in quadrature."""
+"""The point spread of the CT is wider than assumed: the standard deviation of the Gaussian is larger by so much.
 
-import math
+What is added is no Gaussian in quadrature: of that the first bit would change nothing, and a straight line at null would say that
+no width explains what a scan shows.
+"""
 
 from labsim.effects import HalfNormal, Parameter
 
@@ -26,7 +28,7 @@ def parameters(campaign):
 
 leaves = "The edge of the bead is soft, and the densest dust next to it is smeared into the halo; volumes are kept."
 remedy = "measure the scanner's point spread, on the edge of the bead"
-references = ("Convolution of Gaussians: variances add",)
+references = ("Convolution of Gaussians: the result is one, and wider",)
 expect = {"penetration_depth": 0}
 
 
@@ -35,4 +37,4 @@ def applies(campaign):
 
 
 def change_instrument(instrument, values, place):
-    return instrument.replace(ct_blur=math.hypot(instrument.ct_blur, values["sigma"]))
+    return instrument.replace(ct_blur=instrument.ct_blur + values["sigma"])

@@ -83,7 +83,7 @@ class Layering(Direct):
         for each in self.dust:
             instrument = point.instruments[each.name]
             filling_factor = initial_filling_factor(point.setting(each.name), each.depth)
-            spread = math.hypot(POINT_SPREAD_VOXELS * each.scan.voxel, instrument.ct_blur)
+            spread = POINT_SPREAD_VOXELS * each.scan.voxel + instrument.ct_blur
             parts.append(np.append(instrument.stated_filling_factor(filling_factor), math.log(spread)))
         return np.concatenate(parts)
 
