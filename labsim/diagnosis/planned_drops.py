@@ -103,14 +103,8 @@ def plan_drops(
         features.append(RunFeatures(len(groups), table, extract_curve))
         planned.append(("a drop with another projectile,", len(groups), speed, table))
         groups.append(ProjectileGroup(projectile, nodes, False, sparse))
-    extended = replace(
-        problem,
-        grid=replace(problem.grid, groups=groups, runs=dict(problem.grid.runs)),
-        groups=groups,
-        observations=(replace(tracks, features=tuple(features)),),
-        _filled=set(problem._filled),
-        _plain=dict(problem._plain),
-    )
+    tracks = replace(tracks, features=tuple(features))
+    extended = problem.observe_by([tracks], groups, problem.campaign, problem.places)
     require_runs(extended, first)
     last = max(problem.campaign.drops, key=lambda drop: drop.sequence)
     drops, places = list(problem.campaign.drops), dict(problem.places)
@@ -131,12 +125,9 @@ def plan_drops(
         models.append(DropModel(seen, table, start, np.eye(seen.time.size)))
         drops.append(seen.drop)
         places[name] = replace(places[last.name], name=name, tip=projectile.tip)
-    return replace(
-        extended,
-        campaign=replace(problem.campaign, drops=tuple(drops)),
-        places=places,
-        observations=(replace(extended.tracks, models=(*extended.tracks.models, *models)),),
-    ), said
+    seen_by = replace(tracks, models=(*tracks.models, *models))
+    campaign = replace(problem.campaign, drops=tuple(drops))
+    return replace(extended, campaign=campaign, places=places, observations=(seen_by,)), said
 
 
 def predict_drops(problem: Problem, extended: Problem, standing: Sequence[Fit]) -> list[list[Prediction]]:

@@ -108,16 +108,8 @@ def plan_scans(
         observations.append(CompactedZones(tuple(zones)))
     if dust:
         observations.append(Layering(tuple(dust), problem.campaign.sample.filling_factor_sigma))
-    extended = replace(
-        problem,
-        campaign=replace(problem.campaign, scans=(*problem.campaign.scans, *scans)),
-        grid=replace(problem.grid, groups=groups, runs=dict(problem.grid.runs)),
-        groups=groups,
-        places=places,
-        observations=tuple(observations),
-        _filled=set(problem._filled),
-        _plain={key: each for key, each in problem._plain.items() if groups[key[3]].is_scan},
-    )
+    campaign = replace(problem.campaign, scans=(*problem.campaign.scans, *scans))
+    extended = problem.observe_by(observations, groups, campaign, places)
     return extended, [
         (f"a CT scan of {name_tip(scan.projectile)} dropped", f"at {scan.speed.value:.2f} m/s")
         for scan in scans

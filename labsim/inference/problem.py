@@ -53,6 +53,26 @@ class Problem:
         default_factory=dict, repr=False
     )
 
+    def observe_by(
+        self,
+        observations: Sequence[Observation],
+        groups: Sequence[ProjectileGroup],
+        campaign: Campaign,
+        places: Mapping[str, Place],
+    ) -> Problem:
+        """The same simulation seen by other observations, of a campaign with other records, at their places; ``groups`` of runs may
+        have grown. Its runs are kept apart."""
+        return replace(
+            self,
+            observations=tuple(observations),
+            groups=list(groups),
+            campaign=campaign,
+            places=dict(places),
+            grid=replace(self.grid, groups=list(groups), runs=dict(self.grid.runs)),
+            _filled=set(),
+            _plain={},
+        )
+
     @property
     def tracks(self) -> Tracks:
         """All drops."""
