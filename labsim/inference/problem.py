@@ -60,8 +60,8 @@ class Problem:
         campaign: Campaign,
         places: Mapping[str, Place],
     ) -> Problem:
-        """The same simulation seen by other observations, of a campaign with other records, at their places; ``groups`` of runs may
-        have grown. Its runs are kept apart."""
+        """The same simulation seen by other observations, of a campaign with other records, at their places. ``groups`` of runs
+        may have grown; the runs are kept apart."""
         return replace(
             self,
             observations=tuple(observations),
