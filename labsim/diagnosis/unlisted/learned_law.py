@@ -8,7 +8,6 @@ fitted as any cause is. Formulas and figures: docs/learned-law.md.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -33,11 +32,15 @@ MOST_WEIGHED = 4  # formulas that few runs are made of, beside the best of every
 MOST_SIMULATED = (
     4  # of them, those that get as far as the best by ROUGH: ln evidence, which few runs give to some twenty
 )
-ROUGH = 60.0
+ROUGH, ROUGH_SHARE = (
+    60.0,
+    0.01,
+)  # and a share of what is gained: mass that sticks gained 48 100 by few runs, 48 300 by more
 # other forms of a place, those that are weighed first: of fifteen forms of a force of depth the four best after runs of their own
 # were among these (p12)
 MOST_TRIED = 6
-MOST_SIBLINGS = 2  # of the places of the best and of those hardly told from it, likewise
+MOST_SIBLINGS = 2  # of a place, likewise
+PEAKED = "force of depth"  # what a film changes has a peak where drops end in it, which few speeds miss
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
@@ -131,19 +134,15 @@ def fit_formulas(
         with suppress(LabsimError):
             found = fit_from_strengths(problem, nominal, names, top)
             sparse += [found] if found is not None else []
-    fits = _refine(problem, sparse, MOST_SIMULATED)
-    best = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    if fit_p_value(best) < REJECTED:
+    fits = _refine(problem, nominal, sparse, MOST_SIMULATED)
+    if not _explains(fits or [nominal]):
+        best = max(fits, key=lambda fit: fit.evidence, default=nominal)
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    fits = take_better([*fits, *fit_siblings(problem, fits, units)])
-    fits.sort(key=lambda fit: -fit.evidence)
-    for k, fit in enumerate(fits[:MOST_REFINED]):
-        if list_large_effects(problem, fit):
-            with suppress(LabsimError):
-                fits[k] = refine(problem, fit)
-    return fits
+    refined = set[Hypothesis]()
+    fits = fit_siblings(problem, nominal, fits, sparse, units, refined)
+    return _refine_leading(problem, fits, MOST_REFINED, refined)
 
 
 def fit_anew(
@@ -184,30 +183,80 @@ def _start(problem: Problem, name: str, log_p_m: float, size: float, nominal: Fi
     return []
 
 
-def fit_siblings(problem: Problem, fits: Sequence[Fit], units: Mapping[str, float]) -> list[Fit]:
-    """The other terms of the places that the best formula, and those hardly told from it, have terms at; begun where that formula
-    ended and as large: which form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as
-    ``units`` has them in order."""
-    top = max((fit.evidence for fit in fits), default=0.0)
-    near = [fit for fit in fits if fit.evidence > top - ALIKE]
+def fit_siblings(
+    problem: Problem,
+    nominal: Fit,
+    fits: Sequence[Fit],
+    sparse: Sequence[Fit],
+    units: Mapping[str, float],
+    refined: set[Hypothesis],
+) -> list[Fit]:
+    """The fits, and the other terms of their places, begun where the best formula with a term there ended and as large: which
+    form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as ``units`` has them in order.
+
+    Places of the best formula and of those hardly told from it; until something explains the data all places that few runs
+    (``sparse``) lead to, one after another, the dear ones last. refined : formulas that had runs about themselves.
+    """
+    found, seen = list(fits), set[str]()
+    while True:
+        if not _explains(found):
+            found = _refine_leading(problem, found, 1, refined)
+        explained = _explains(found)
+        begun = _list_places(found, sparse, units)
+        place = next((each for each in begun if each not in seen), None)
+        if place is None:
+            return found
+        seen.add(place)
+        start, size = begun[place]
+        known = {fit.hypothesis for fit in found}
+        names = [name for name in units if list_terms()[name].place == place and (name,) not in known]
+        siblings: list[Fit] = []
+        for name in names[:MOST_TRIED]:
+            begin = (start.log_p_m, {name: size * units[name]})
+            with suppress(LabsimError):
+                siblings.append(
+                    fit_hypothesis(problem, (name,), begin, sparse=place != PEAKED, nuisances=start)
+                )
+            if place != PEAKED and not explained:  # where the wrong form led, the right one's runs may fail
+                top = max([nominal.evidence, *(fit.evidence for fit in siblings)])
+                with suppress(LabsimError):
+                    again = fit_from_strengths(problem, nominal, (name,), top)
+                    siblings += [again] if again is not None else []
+        found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
+
+
+def _explains(fits: Sequence[Fit]) -> bool:
+    """Whether the best of some fits explains the data."""
+    best = max(fits, key=lambda fit: fit.evidence, default=None)
+    return best is not None and fit_p_value(best) >= REJECTED
+
+
+def _list_places(
+    fits: Sequence[Fit], sparse: Sequence[Fit], units: Mapping[str, float]
+) -> dict[str, tuple[Fit, float]]:
+    """Where siblings are looked for, in order: the best fit with a term at a place, and how large that is over its unit."""
+    best = max(fits, key=lambda fit: fit.evidence, default=None)
+    if best is None:
+        return {}
+    near = [fit for fit in fits if fit.evidence > best.evidence - ALIKE]
+    if not _explains(fits):
+        near = [fit for fit in (*fits, *sparse) if fit.evidence > best.evidence - NOWHERE]
     begun: dict[str, tuple[Fit, float]] = {}
     for fit in sorted(near, key=lambda fit: -fit.evidence):
-        for own in fit.hypothesis:
-            begun.setdefault(list_terms()[own].place, (fit, fit.values[own] / units[own]))
-    known = {fit.hypothesis for fit in fits}
-    sparse = []
-    tried = Counter[str]()
-    for name in units:
-        term = list_terms()[name]
-        if term.place in begun and (name,) not in known and tried[term.place] < MOST_TRIED:
-            tried[term.place] += 1
-            best, size = begun[term.place]
-            # what a force at one depth changes has a peak where drops end there, which few speeds miss
-            few = term.acts.over != "depth"
+        for name in fit.hypothesis:
+            begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
+    return dict(sorted(begun.items(), key=lambda each: each[0] == PEAKED))
+
+
+def _refine_leading(problem: Problem, fits: Sequence[Fit], most: int, refined: set[Hypothesis]) -> list[Fit]:
+    """The fits, the best first; ``most`` of these among runs about themselves where they are large."""
+    ordered = sorted(fits, key=lambda fit: -fit.evidence)
+    for k, fit in enumerate(ordered[:most]):
+        if fit.hypothesis not in refined and list_large_effects(problem, fit):
+            refined.add(fit.hypothesis)
             with suppress(LabsimError):
-                begin = (best.log_p_m, {name: size * units[name]})
-                sparse.append(fit_hypothesis(problem, (name,), begin, sparse=few, nuisances=best))
-    return _refine(problem, sparse, MOST_SIBLINGS)
+                ordered[k] = refine(problem, fit)
+    return sorted(ordered, key=lambda fit: -fit.evidence)
 
 
 def take_better(fits: Sequence[Fit]) -> list[Fit]:
@@ -219,10 +268,11 @@ def take_better(fits: Sequence[Fit]) -> list[Fit]:
     return list(found.values())
 
 
-def _refine(problem: Problem, sparse: Sequence[Fit], most: int) -> list[Fit]:
-    """Those that come as far as the best of them by ROUGH, ``most`` at most, with runs of their own."""
+def _refine(problem: Problem, nominal: Fit, sparse: Sequence[Fit], most: int) -> list[Fit]:
+    """Those that come as far as the best of them, but for what few runs leave open, ``most`` at most, with runs of their own."""
     top = max((fit.evidence for fit in sparse), default=0.0)
-    near = sorted((fit for fit in sparse if fit.evidence > top - ROUGH), key=lambda fit: -fit.evidence)
+    rough = max(ROUGH, ROUGH_SHARE * (top - nominal.evidence))
+    near = sorted((fit for fit in sparse if fit.evidence > top - rough), key=lambda fit: -fit.evidence)
     return [
         fit
         for each in near[:most]
@@ -255,8 +305,8 @@ def choose_formulas(
 
 def share_places(terms: Mapping[str, Term]) -> dict[str, float]:
     """ln prior of every term: all places are as likely as one another, however many terms somebody has thought of there."""
-    counts = Counter(term.place for term in terms.values())
-    return {name: -math.log(counts[term.place]) for name, term in terms.items()}
+    places = [term.place for term in terms.values()]
+    return {name: -math.log(places.count(term.place)) for name, term in terms.items()}
 
 
 def share_hats(term: Term, law: FreeLaw) -> FloatArray:

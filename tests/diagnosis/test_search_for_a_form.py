@@ -1,0 +1,76 @@
+"""Which forms of a law are tried, and when the search ends: with fits that cost nothing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from labsim.diagnosis.unlisted import learned_law
+from labsim.effects.terms import list_terms
+from labsim.errors import ExtrapolationError
+
+EVIDENCE = {"depth_root": 100.0, "stuck_cap": 80.0, "stuck_mass": 600.0, "inertial_drag": -1e6}
+NOMINAL = SimpleNamespace(hypothesis=(), evidence=0.0, log_p_m=7.0, values={})
+
+
+def make_fit(name: str, log_p_m: float = 6.0):
+    return SimpleNamespace(
+        hypothesis=(name,), evidence=EVIDENCE.get(name, 10.0), log_p_m=log_p_m, values={name: 0.2}
+    )
+
+
+@pytest.fixture
+def search(monkeypatch):
+    """What was asked for, in order; forms of mass fail where the wrong form led, stuck_mass alone explains the data."""
+    asked: list[tuple[str, str]] = []
+
+    def fit_there(problem, names, start, **how):
+        asked.append((names[0], "there"))
+        if list_terms()[names[0]].place == "mass of depth" and how.get("sparse"):
+            raise ExtrapolationError("simulation", "runs", "never stop")
+        return make_fit(names[0])
+
+    def fit_anew(problem, nominal, names, top):
+        asked.append((names[0], "anew"))
+        return make_fit(names[0])
+
+    monkeypatch.setattr(learned_law, "fit_hypothesis", fit_there)
+    monkeypatch.setattr(learned_law, "fit_from_strengths", fit_anew)
+    monkeypatch.setattr(learned_law, "list_large_effects", lambda problem, fit: [])
+    monkeypatch.setattr(
+        learned_law, "fit_p_value", lambda fit: 0.4 if fit.hypothesis == ("stuck_mass",) else 1e-9
+    )
+    units = {name: 1.0 for name, term in list_terms().items() if not term.acts.see}
+
+    def run(*names: str):
+        fits = [make_fit(name) for name in names]
+        found = learned_law.fit_siblings(None, NOMINAL, fits, fits, units, set())
+        return sorted(found, key=lambda fit: -fit.evidence), asked
+
+    return run
+
+
+def test_the_right_form_is_found_at_a_place_whose_first_form_is_far_behind(search) -> None:
+    found, asked = search("depth_root", "stuck_cap")
+    assert found[0].hypothesis == ("stuck_mass",)
+    assert ("stuck_mass", "there") in asked and ("stuck_mass", "anew") in asked
+    # it explains the data: of the place that led before nothing more is simulated
+    assert {list_terms()[name].place for name, _ in asked} == {"mass of depth"}
+
+
+def test_while_nothing_explains_the_data_every_place_is_searched_once(search, monkeypatch) -> None:
+    monkeypatch.setitem(EVIDENCE, "stuck_mass", 79.0)
+    _, asked = search("depth_root", "stuck_cap")
+    places = [list_terms()[name].place for name, _ in asked]
+    assert places == sorted(places, reverse=True) and set(places) == {"mass of depth", "force of depth"}
+    tried = {name for name, _ in asked}
+    assert all(
+        sum(list_terms()[name].place == place for name in tried) <= learned_law.MOST_TRIED for place in places
+    )
+
+
+def test_a_place_that_leads_nowhere_is_not_searched(search, monkeypatch) -> None:
+    monkeypatch.setitem(EVIDENCE, "stuck_mass", 79.0)
+    _, asked = search("depth_root", "inertial_drag")
+    assert "force of speed" not in {list_terms()[name].place for name, _ in asked}
