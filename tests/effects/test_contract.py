@@ -91,6 +91,7 @@ BROKEN = {
     "no references": ("references = (", "sources = (", ["references", "tuple of texts"]),
     "unknown observable": ('"penetration_depth": 1', '"depth": 1', ["expect", "penetration_depth"]),
     "remedy not a sentence": ('expect = {', 'remedy = "{other}"\nexpect = {', ["remedy", "first parameter"]),
+    "a way without it that is no text": ('expect = {', 'without = 3\nexpect = {', ["without", "deeper sample"]),
     "one title for two": ('kind = "', 'says = ("Lighter",)\nkind = "', ["says", "two titles"]),
     "sign not a sign": ('"penetration_depth": 1', '"penetration_depth": 2', ["expect", "-1, 0 or 1"]),
     "changes nothing": ("def change_setting", "def change_nothing", ["change_setting", "at least one"]),
