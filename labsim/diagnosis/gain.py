@@ -8,12 +8,13 @@ bends, hold_out_folds repeats it without the drops.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
+from ..inference.fits.blocks import Block
 from ..inference.fits.fitting import Fit, fit_hypothesis
 from ..inference.problem import Problem
 from ..records import FloatArray
@@ -45,18 +46,17 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class _HeldDrop:
-    """One drop, or some, held out: errors of the prediction are linear in the data. held, seen : (n,) which; design : (n, k) of
+class Unseen:
+    """Rows that no fit has seen: errors of their prediction are linear in the data. held, seen : (n,) which; design : (n, k) of
     all."""
 
     held: np.ndarray
     seen: np.ndarray
     design: FloatArray
     solved: FloatArray  # C⁻¹ times the design of what is seen
-    weights: FloatArray  # (held, seen) of its own errors that the others tell
-    covariance: FloatArray  # (k, k) of the globals without it
-    spread: FloatArray  # (held, held) of its prediction
-    lengths: FloatArray  # (held, held) that turns an error of its data into m, as depth or by integration
+    weights: FloatArray  # (held, seen) of their own errors that the others tell
+    covariance: FloatArray  # (k, k) of the globals without them
+    spread: FloatArray  # (held, held) of their prediction
 
     def miss(self, residual: FloatArray, pull: FloatArray) -> FloatArray:
         """Data minus prediction, (held, ...), for residuals (n, ...) and what scans and priors say of the globals, (k, ...)."""
@@ -65,14 +65,31 @@ class _HeldDrop:
         return residual[self.held] - self.design[self.held] @ best - self.weights @ left
 
 
+def predict_unseen(
+    held: np.ndarray, design: FloatArray, covariance: FloatArray, precision: FloatArray
+) -> Unseen:
+    """held : (n,) bool; design : (n, k); covariance : (n, n) of all errors; precision : (k, k), what else is known of the
+    globals."""
+    seen = ~held
+    cross = covariance[np.ix_(held, seen)]
+    both = np.hstack([design[seen], cross.T])
+    if seen.any():
+        both = cho_solve(cho_factor(covariance[np.ix_(seen, seen)], lower=True), both)
+    solved, weights = both[:, : design.shape[1]], both[:, design.shape[1] :].T
+    of_globals = np.linalg.inv(design[seen].T @ solved + precision)
+    reach = design[held] - cross @ solved
+    spread = covariance[np.ix_(held, held)] - weights @ cross.T + reach @ of_globals @ reach.T
+    return Unseen(held, seen, design, solved, weights, of_globals, spread)
+
+
 def _hold_out(
     problem: Problem, fit: Fit, known: bool, groups: Sequence[Sequence[str]]
-) -> tuple[list[_HeldDrop], FloatArray, FloatArray]:
-    """Every group of drops held out, by the names of their records; what scans and priors say of the globals: pull (k,) and
-    precision (k, k)."""
+) -> tuple[list[tuple[Unseen, FloatArray]], FloatArray, FloatArray]:
+    """Every group of drops held out, by the names of their records, and what turns an error of its data into m, as depth or by
+    integration, (held, held); what scans and priors say of the globals: pull (k,) and precision (k, k)."""
     linear = fit.drops
     names = [] if known else ["ln_p_m", *fit.hypothesis]
-    design = _stack(linear.tangents, names, linear.residual.size)
+    design = stack_tangents(linear, names)
     pull, precision = weigh_globals(problem, fit, names)
     drops = []
     models = {model.observed.name: model for model in problem.tracks.models}
@@ -81,16 +98,8 @@ def _hold_out(
         for name in records:
             section = linear.sections[name]
             held[section.start : section.start + models[name].data.size] = models[name].held
-        seen = ~held
-        factor = cho_factor(linear.covariance[np.ix_(seen, seen)], lower=True)
-        cross = linear.covariance[np.ix_(held, seen)]
-        solved = cho_solve(factor, design[seen])
-        covariance = np.linalg.inv(design[seen].T @ solved + precision)
-        weights = cho_solve(factor, cross.T).T
-        reach = design[held] - cross @ solved
-        spread = linear.covariance[np.ix_(held, held)] - weights @ cross.T + reach @ covariance @ reach.T
         lengths = block_diag(*(models[n].lengths[np.ix_(models[n].held, models[n].held)] for n in records))
-        drops.append(_HeldDrop(held, seen, design, solved, weights, covariance, spread, lengths))
+        drops.append((predict_unseen(held, design, linear.covariance, precision), lengths))
     return drops, pull, precision
 
 
@@ -106,7 +115,7 @@ def weigh_globals(
         precision[k, k] = 1 / width**2
         pull[k] = -fit.values[name] / width**2
     for block in (block for k, block in enumerate(fit.blocks) if k not in without):
-        columns = _stack(block.tangents, names, block.residual.size)
+        columns = stack_tangents(block, names)
         solved = block.solve(columns)
         precision += columns.T @ solved
         pull += solved.T @ block.residual
@@ -154,15 +163,15 @@ def predict_held_out(
         return HeldOut(names, nothing, nothing, nothing, np.ones(1))
     rms, expected, score, count = [], [], [], []
     drops, pull, _precision = _hold_out(problem, fit, known, groups)
-    for drop in drops:
+    for drop, lengths in drops:
         error = drop.miss(fit.drops.residual, pull)
         lower = np.linalg.cholesky(drop.spread)
         white = np.linalg.solve(lower, error)
         score.append(
             -0.5 * white @ white - np.sum(np.log(np.diag(lower))) - 0.5 * error.size * math.log(2 * math.pi)
         )
-        rms.append(math.sqrt(np.mean((drop.lengths @ error) ** 2)))
-        expected.append(math.sqrt(np.mean(np.diag(drop.lengths @ drop.spread @ drop.lengths.T))))
+        rms.append(math.sqrt(np.mean((lengths @ error) ** 2)))
+        expected.append(math.sqrt(np.mean(np.diag(lengths @ drop.spread @ lengths.T))))
         count.append(error.size)
     return HeldOut(names, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
 
@@ -180,14 +189,14 @@ def check_prediction(problem: Problem, fit: Fit, random: np.random.Generator, dr
     residuals = lower @ random.standard_normal((len(lower), draws))
     values, axes = np.linalg.eigh(precision)
     pulls = axes * np.sqrt(np.maximum(values, 0.0)) @ random.standard_normal((len(values), draws))
-    seen = sum(float(np.sum((drop.lengths @ drop.miss(fit.drops.residual, pull)) ** 2)) for drop in drops)
-    drawn = sum(np.sum((drop.lengths @ drop.miss(residuals, pulls)) ** 2, axis=0) for drop in drops)
+    seen = sum(float(np.sum((lengths @ drop.miss(fit.drops.residual, pull)) ** 2)) for drop, lengths in drops)
+    drawn = sum(np.sum((lengths @ drop.miss(residuals, pulls)) ** 2, axis=0) for drop, lengths in drops)
     return float((1 + np.count_nonzero(drawn >= seen)) / (1 + draws))
 
 
-def _stack(tangents: Mapping[str, FloatArray], names: Sequence[str], rows: int) -> FloatArray:
-    """(rows, names) of tangents; there may be none."""
-    return np.array([tangents[name] for name in names]).reshape(len(names), rows).T
+def stack_tangents(block: Block, names: Sequence[str]) -> FloatArray:
+    """(rows, names) of a block's tangents; there may be none."""
+    return np.array([block.tangents[name] for name in names]).reshape(len(names), block.residual.size).T
 
 
 def measure_gain(nominal: HeldOut, extended: HeldOut) -> Gain:

@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from ..inference.emulation.curves import extract_curve
 from ..inference.emulation.forward import Instant, ResponseTable
@@ -29,7 +28,7 @@ from ..inference.observations.drop_model import DropModel
 from ..inference.observations.observe import FilmedDrop, ObservedDrop
 from ..inference.problem import Problem
 from ..records import STANDARD_GRAVITY, Camera, FloatArray, Projectile
-from .gain import weigh_globals
+from .gain import predict_unseen, stack_tangents, weigh_globals
 
 USUAL_SIGMA, USUAL_PIXEL = 2e-6, 1e-5  # m, of a camera where no drop had one
 USUAL_FRAMES = 40.0  # of it, up to the stop
@@ -87,13 +86,14 @@ def plan_drops(
     tracks, first = copy.deepcopy(problem.tracks), standing[0]
     groups, features = list(problem.groups), list(tracks.features)
     tables = {each.group: each.table for each in reversed(features)}  # of the curve, the first of a group
+    usual, causes = find_usual(problem), sorted({name for fit in standing for name in fit.hypothesis})
     planned: list[tuple[str, int, float, ResponseTable]] = []
     for number, group in enumerate(problem.groups):
         if group.is_scan or group.pushed:
             continue
         planned += [("one more drop with", number, speed, tables[number]) for speed in group.speeds[1:]]
-        for name in sorted({name for fit in standing for name in fit.hypothesis}):
-            if group is find_usual(problem) and (way := problem.effects[name].without):
+        for name in causes:
+            if group is usual and (way := problem.effects[name].without):
                 table = replace(tables[number], absent=frozenset({name}))
                 planned += [(f"a drop {way}, with", number, speed, table) for speed in group.speeds[1:]]
     for projectile, speed in _list_others(problem) if new else []:
@@ -179,22 +179,11 @@ def predict_rows(
     their errors, the same for all fits: that two causes have errors of another shape is no evidence.
     """
     names = ["ln_p_m", *fit.hypothesis]
-    design = np.concatenate([np.stack([each.tangents[n] for n in names], axis=1) for each in blocks.values()])
+    design = np.concatenate([stack_tangents(each, names) for each in blocks.values()])
     residual = np.concatenate([each.residual for each in blocks.values()])
     pull, precision = weigh_globals(problem, fit, names, blocks)
-    weights = np.zeros((np.count_nonzero(~seen), np.count_nonzero(seen)))
-    if seen.any():
-        factor = cho_factor(covariance[np.ix_(seen, seen)], lower=True)
-        solved = cho_solve(factor, design[seen])
-        pull, precision = pull + solved.T @ residual[seen], precision + design[seen].T @ solved
-        weights = cho_solve(factor, covariance[np.ix_(seen, ~seen)]).T
-    of_globals = np.linalg.inv(precision)
-    best = of_globals @ pull
-    reach = design[~seen] - weights @ design[seen]
-    # the data are nought: what is left of them is the simulation's rows, downwards
-    mean = design[~seen] @ best + weights @ (residual[seen] - design[seen] @ best) - residual[~seen]
-    spread = covariance[np.ix_(~seen, ~seen)] - weights @ covariance[np.ix_(seen, ~seen)]
-    return mean, spread + reach @ of_globals @ reach.T
+    unseen = predict_unseen(~seen, design, covariance, precision)
+    return -unseen.miss(residual, pull), unseen.spread  # data of nought less what is expected of them
 
 
 def _condition(

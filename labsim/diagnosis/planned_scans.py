@@ -24,6 +24,7 @@ from ..inference.observations import Observation, RunFeatures
 from ..inference.observations.compacted_zone import CompactedZone, CompactedZones, ObservedScan, extract_map
 from ..inference.observations.undisturbed import Layering, UndisturbedDust
 from ..inference.problem import Problem
+from ..inference.supported import compares_scans
 from ..records import FillingMap, FloatArray, GreyCalibration, Measured, Projectile, Scan
 from .planned_drops import Prediction, find_usual, name_tip, predict_rows
 
@@ -52,7 +53,7 @@ class ScanPrediction(Prediction):
     @property
     def text(self) -> str:
         said = ", ".join(
-            f"{level:.3f} ± {sigma:.3f} {place}" for place, (level, sigma) in self.levels.items()
+            f"{level:.4f} ± {sigma:.4f} {place}" for place, (level, sigma) in self.levels.items()
         )
         return f"filling factor {said}"
 
@@ -83,7 +84,7 @@ def plan_scans(
         if zone.name in of_dust:
             dust.append(replace(of_dust[zone.name], scan=again))
     usual = find_usual(problem)
-    if new and not zones and usual is not None:
+    if new and not zones and usual is not None and compares_scans(problem.campaign):
         speed = usual.speeds[len(usual.speeds) // 2]
         drops = next(each.table for each in problem.tracks.features if groups[each.group] is usual)
         depth = math.exp(drops.features(fit.log_p_m, math.log(speed), fit.values)[0])
@@ -142,8 +143,8 @@ def predict_scans(problem: Problem, extended: Problem, standing: Sequence[Fit]) 
         predictions.append(
             [
                 _state_levels(zone, mean[rows], spread[np.ix_(rows, rows)])
-                for zone in extended.scans
-                if zone.name not in measured and (rows := np.nonzero(of_scan[~seen] == zone.name)[0]).size
+                for zone in extended.scans[len(problem.scans) :]
+                for rows in [np.nonzero(of_scan[~seen] == zone.name)[0]]
             ]
         )
     return predictions
@@ -207,13 +208,12 @@ def _plan_map(
     # whatever the tip's shape, none of it is farther from the axis than its radius
     tip = (columns < radius + GUARD * voxel) & (rows > -depth - GUARD * voxel)
     cells = np.broadcast_to(rows < ABOVE * radius - depth, tip.shape) & ~tip
-    count = np.full(tip.shape, 1.0)
     found = FillingMap(
         r,
         z,
         np.full(tip.shape, level),
         np.full(tip.shape, USUAL_NOISE),
-        count,
+        np.ones(tip.shape),
         depth,
         radius,
         (0.0, 0.0),

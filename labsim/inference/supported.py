@@ -18,6 +18,11 @@ SHAFTS = ("von_mises",)
 INSTEAD = "labsim simulate --campaign CAMPAIGN --drop NAME simulates it"
 
 
+def compares_scans(campaign: Campaign) -> bool:
+    """Whether a CT scan of one of its drops would be compared with what is simulated."""
+    return campaign.material.law == DUST and campaign.geometry == "axisymmetric"
+
+
 def refuse_others(campaign: Campaign) -> None:
     """Raise InferenceError where a campaign states what nothing is compared with."""
     law, file = campaign.material.law, campaign.folder / "campaign.toml"

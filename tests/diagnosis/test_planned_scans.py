@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import laws
 import numpy as np
@@ -115,3 +116,13 @@ def test_dust_beside_the_tip_tells_what_drops_cannot(dropped) -> None:
     )
     bits = expected_weight([plain.mean, denser.mean], [plain.spread, denser.spread], np.array([0.5, 0.5]))
     assert abs(other.evidence - fit.evidence) < 1.0 and bits > 10.0
+
+
+def test_no_scan_is_planned_that_nothing_would_be_compared_with(dropped) -> None:
+    problem, fit = dropped
+    for changed in (
+        {"geometry": "planar"},
+        {"material": replace(problem.campaign.material, law="von_mises")},
+    ):
+        other = replace(problem, campaign=replace(problem.campaign, **changed))
+        assert plan_scans(other, [fit], new=True)[1] == []

@@ -45,7 +45,7 @@ def search(monkeypatch):
 
     def run(*names: str):
         fits = [make_fit(name) for name in names]
-        found = learned_law.fit_siblings(None, NOMINAL, fits, fits, units, set())
+        found = learned_law.fit_siblings(None, NOMINAL, fits, fits, units)
         return sorted(found, key=lambda fit: -fit.evidence), asked
 
     return run

@@ -140,9 +140,7 @@ def fit_formulas(
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    refined = set[Hypothesis]()
-    fits = fit_siblings(problem, nominal, fits, sparse, units, refined)
-    return _refine_leading(problem, fits, MOST_REFINED, refined)
+    return fit_siblings(problem, nominal, fits, sparse, units)
 
 
 def fit_anew(
@@ -189,23 +187,23 @@ def fit_siblings(
     fits: Sequence[Fit],
     sparse: Sequence[Fit],
     units: Mapping[str, float],
-    refined: set[Hypothesis],
 ) -> list[Fit]:
     """The fits, and the other terms of their places, begun where the best formula with a term there ended and as large: which
     form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as ``units`` has them in order.
 
     Places of the best formula and of those hardly told from it; until something explains the data all places that few runs
-    (``sparse``) lead to, one after another, the dear ones last. refined : formulas that had runs about themselves.
+    (``sparse``) lead to, one after another, the dear ones last. The best, in the end MOST_REFINED of them, have runs about
+    themselves.
     """
-    found, seen = list(fits), set[str]()
+    found, seen, refined = list(fits), set[str](), set[Hypothesis]()
     while True:
         if not _explains(found):
             found = _refine_leading(problem, found, 1, refined)
         explained = _explains(found)
-        begun = _list_places(found, sparse, units)
+        begun = _list_places(found, () if explained else sparse, units, ALIKE if explained else NOWHERE)
         place = next((each for each in begun if each not in seen), None)
         if place is None:
-            return found
+            return _refine_leading(problem, found, MOST_REFINED, refined)
         seen.add(place)
         start, size = begun[place]
         known = {fit.hypothesis for fit in found}
@@ -232,18 +230,14 @@ def _explains(fits: Sequence[Fit]) -> bool:
 
 
 def _list_places(
-    fits: Sequence[Fit], sparse: Sequence[Fit], units: Mapping[str, float]
+    fits: Sequence[Fit], sparse: Sequence[Fit], units: Mapping[str, float], behind: float
 ) -> dict[str, tuple[Fit, float]]:
-    """Where siblings are looked for, in order: the best fit with a term at a place, and how large that is over its unit."""
-    best = max(fits, key=lambda fit: fit.evidence, default=None)
-    if best is None:
-        return {}
-    near = [fit for fit in fits if fit.evidence > best.evidence - ALIKE]
-    if not _explains(fits):
-        near = [fit for fit in (*fits, *sparse) if fit.evidence > best.evidence - NOWHERE]
+    """Where siblings are looked for, in order: the best fit with a term at a place, and how large that is over its unit. behind :
+    the best of ``fits`` by so much in ln evidence at most."""
+    top = max((fit.evidence for fit in fits), default=math.inf)
     begun: dict[str, tuple[Fit, float]] = {}
-    for fit in sorted(near, key=lambda fit: -fit.evidence):
-        for name in fit.hypothesis:
+    for fit in sorted((*fits, *sparse), key=lambda fit: -fit.evidence):
+        for name in fit.hypothesis if fit.evidence > top - behind else ():
             begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
     return dict(sorted(begun.items(), key=lambda each: each[0] == PEAKED))
 

@@ -1,7 +1,7 @@
-"""The point spread of the CT is wider than assumed: the standard deviation of the Gaussian is larger by so much.
+"""The point spread of the CT is wider than one voxel: the standard deviation of its Gaussian is larger by so much.
 
-What is added is no Gaussian in quadrature: of that the first bit would change nothing, and a straight line at null would say that
-no width explains what a scan shows.
+It is a difference of widths. A second Gaussian in quadrature would change the width by nothing to first order, by which causes
+are screened.
 """
 
 from labsim.effects import HalfNormal, Parameter
@@ -28,7 +28,7 @@ def parameters(campaign):
 
 leaves = "The edge of the bead is soft, and the densest dust next to it is smeared into the halo; volumes are kept."
 remedy = "measure the scanner's point spread, on the edge of the bead"
-references = ("Convolution of Gaussians: the result is one, and wider",)
+references = ("A Gaussian point spread, fitted to the edge of the bead",)
 expect = {"penetration_depth": 0}
 
 

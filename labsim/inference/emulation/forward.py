@@ -155,9 +155,11 @@ def _read_clock(
     """True times from contact (s) at which the tip was seen where frames of these stated times (s) show it."""
     clock = instrument.true_time(time) - instant.contact_time
     clock = clock * (1.0 + 0.5 * instrument.clock_drift * clock)
-    exposed = clock
+    if instrument.row_delay == 0.0:
+        return clock
     released = -math.exp(instant.log_speed) / STANDARD_GRAVITY  # before that the tip hangs still
-    for _ in range(EXPOSED if instrument.row_delay else 0):  # where it is says when its row is read
+    exposed = clock
+    for _ in range(EXPOSED):  # where it is says when its row is read
         exposed = clock + instrument.row_delay * _fall(features, np.maximum(exposed, released), instant)
     return exposed
 

@@ -21,7 +21,6 @@ FREE = 1.0e-3  # s, prior width of the contact time: as good as free
 SPEED_WIDTH = 0.05  # of ln speed, prior width
 LEAST_SURFACE = 1e-9  # m
 WIDTHS = (FREE, SPEED_WIDTH)
-LEAP = 0.3  # of ln speed, the most in one step
 
 
 @dataclass(frozen=True)
@@ -147,18 +146,14 @@ class DropModel:
         The largest move in prior widths; contact time in units of a frame, speed in per cent.
         """
         free, speed_width = widths
-        # a hypothesis that leads nowhere must not run off beyond all numbers
-        frame = 1.0 / self.camera.frame_rate
-        later = float(np.clip(best[0] * free, -free - frame, free + frame))
-        faster = float(np.clip(best[1] * speed_width, -LEAP, LEAP))
         after = Instant(
-            before.contact_time + later,
-            before.log_speed + faster,
+            before.contact_time + best[0] * free,
+            before.log_speed + best[1] * speed_width,
             best[2] * self.surface_sigma,
         )
         return after, max(
-            abs(later) * self.camera.frame_rate,
-            abs(faster) * 100,
+            abs(best[0] * free) * self.camera.frame_rate,
+            abs(best[1] * speed_width) * 100,
             abs(after.surface - before.surface) / self.surface_sigma,
         )
 
