@@ -37,10 +37,13 @@ WIDTH, BELOW, ABOVE = (
     2.0,
     0.3,
 )  # tip radii of the map: from the axis, below the tip, above its lowest point
-# whose mean filling factor is told: tip radii below the tip, from where to where, and from the axis
-REGIONS = {"under the tip": (0.0, 0.5), "a radius deeper": (0.75, 1.25)}
-CORE = 0.5
-BESIDE = "in dust that was not reached"
+# whose mean filling factor is told, in tip radii: below the lowest point of the tip and from the axis, from where to where
+REGIONS = {
+    "under the tip": ((0.0, 0.5), (0.0, 0.5)),
+    "a radius deeper": ((0.75, 1.25), (0.0, 0.5)),
+    "beside the tip": ((-0.3, 0.3), (1.2, 1.8)),
+}
+UNREACHED = "in dust that was not reached"
 
 
 @dataclass(frozen=True)
@@ -153,14 +156,11 @@ def predict_scans(problem: Problem, extended: Problem, standing: Sequence[Fit]) 
 def _state_levels(zone: CompactedZone, mean: FloatArray, spread: FloatArray) -> ScanPrediction:
     """mean (n,), spread (n, n): of a scan's cells, then the tip's depth, then its undisturbed dust with the point spread."""
     r, below = zone.observed.about_tip[:, 0], -zone.observed.about_tip[:, 1]
-    weights = {
-        place: np.append(
-            np.where((r < CORE) & (below > first) & (below < last), r, 0.0), np.zeros(mean.size - r.size)
-        )
-        for place, (first, last) in REGIONS.items()
-    }
-    weights[BESIDE] = np.zeros(mean.size)
-    weights[BESIDE][r.size + 1 : -1] = 1.0
+    weights = {place: np.zeros(mean.size) for place in (*REGIONS, UNREACHED)}
+    for place, ((above, under), (inner, outer)) in REGIONS.items():
+        inside = (below > above) & (below < under) & (r > inner) & (r < outer)
+        weights[place][: r.size] = np.where(inside, r, 0.0)
+    weights[UNREACHED][r.size + 1 : -1] = 1.0
     return ScanPrediction(
         mean,
         spread,

@@ -93,7 +93,8 @@ def test_a_scan_of_a_campaign_without_any_is_seen_in_a_run_of_its_drop(dropped) 
     cells = see_dust(run, observed.map, observed.point_spread, masked=~observed.cells)[observed.cells]
     contrast = np.abs(cells - observed.undisturbed).max()
     assert np.mean(np.abs(found.mean[: cells.size] - cells)) < 0.1 * contrast
-    under, deeper, beside = found.levels.values()
+    under, deeper, aside, beside = found.levels.values()
+    assert observed.undisturbed - 3 * aside[1] < aside[0] < under[0]
     assert observed.undisturbed < deeper[0] < under[0] < 0.6 and beside[0] == pytest.approx(0.15, abs=0.003)
     # what was never scanned is known by the errors of the solver alone: more than noise, less than the contrast
     assert 5e-4 < under[1] < contrast
