@@ -38,7 +38,7 @@ def test_each_map_by_itself_is_what_it_was(twice):
     for section in both.sections.values():
         np.testing.assert_allclose(both.residual[section], one.residual, rtol=1e-12)
         np.testing.assert_allclose(both.covariance[section, section], one.covariance, rtol=1e-9, atol=1e-18)
-        np.testing.assert_allclose(both.free[section, section], one.free, rtol=1e-9)
+        np.testing.assert_allclose(both.free()[section, section], one.free(), rtol=1e-9)
 
 
 def test_two_maps_of_like_drops_differ_by_their_own_errors_alone(twice):

@@ -16,12 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import truncnorm
 
 from ...inference.emulation.grid import Request
 from ...inference.emulation.nodes import amplitude_nodes, place_strength
 from ...inference.fits.blocks import Block, solve_globals
-from ...inference.fits.evidence import log_share_inside
+from ...inference.fits.evidence import cut_moments, log_share_inside
 from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_p_value
 from ...inference.fits.steps import move_nuisances
 from ...inference.fits.tangents import linearise_at
@@ -223,15 +222,11 @@ def integrate(
     low, high = (limit - found.log_p_m for limit in limits)
     sigma = math.sqrt(covariance[0, 0])
     evidence += log_share_inside(low, high, best[0], sigma)
-    # a Gaussian cut in its first coordinate: the others follow that one's mean and variance. Its skewness, which nobody asks for,
-    # is no number where a limit is 10⁴ standard deviations off
-    with np.errstate(invalid="ignore"):
-        mean, variance = truncnorm.stats((low - best[0]) / sigma, (high - best[0]) / sigma)
+    # a Gaussian cut in its first coordinate: the others follow that one's mean and variance
+    mean, variance = cut_moments(low, high, float(best[0]), sigma)
     along = covariance[0] / sigma
-    best = best + along * float(mean)
-    return Marginal(
-        float(evidence), best, covariance + np.outer(along, along) * (max(float(variance), 0.0) - 1.0)
-    )
+    best = best + along * mean
+    return Marginal(float(evidence), best, covariance + np.outer(along, along) * (variance - 1.0))
 
 
 def average(laws: Sequence[FreeLaw], each: Sequence[Marginal]) -> tuple[tuple[RecoveredLaw, ...], FloatArray]:

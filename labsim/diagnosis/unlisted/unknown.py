@@ -78,15 +78,16 @@ def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) ->
     n = sum(block.residual.size for block in fit.blocks)
     terms: dict[str, list[float]] = {}
     best: tuple[float, str, float, FloatArray] | None = None
+    changes = [block.free() if block.free is not None else None for block in fit.blocks[1:]]
     for name, freedom in FREEDOMS.items():
         if DUST in freedom.kinds and DUST not in kinds:
             continue
         shape = law_covariance(coordinates, freedom.scales) if freedom.scales else None
         for size in SIZES:
-            free = [inflate(Block(drops.residual, drops.covariance, drops.tangents, shape), size)]
+            free = [inflate(Block(drops.residual, drops.covariance, drops.tangents), shape, size)]
             free += [
-                inflate(block, MAP_SHARE * size * (kind in freedom.kinds))
-                for kind, block in zip(kinds[1:], fit.blocks[1:], strict=True)
+                inflate(block, change if kind in freedom.kinds else None, MAP_SHARE * size)
+                for kind, block, change in zip(kinds[1:], fit.blocks[1:], changes, strict=True)
             ]
             step, variance, chi, logdet, weighted = solve_globals(free, ["ln_p_m"], {})
             evidence = -0.5 * (chi + logdet + n * math.log(2 * math.pi))
@@ -135,11 +136,9 @@ def log_mean(values: Collection[float]) -> float:
     return top + math.log(sum(math.exp(value - top) for value in values) / len(values))
 
 
-def inflate(block: Block, size: float) -> Block:
-    """The block with its free covariance, of this size, among its errors."""
-    if block.free is None or size == 0.0:
-        return block
-    return replace(block, covariance=block.covariance + size**2 * block.free)
+def inflate(block: Block, free: FloatArray | None, size: float) -> Block:
+    """The block with a free covariance, of this size, among its errors."""
+    return block if free is None else replace(block, covariance=block.covariance + size**2 * free)
 
 
 def law_coordinates(problem: Problem, fit: Fit) -> dict[str, FloatArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,7 +21,7 @@ from ...records import FloatArray
 class Block:
     """residual : (n,); covariance : (n, n); tangents : name of global -> (n,).
 
-    free : (n, n) covariance of what an unknown cause of unit size may do here, None where it may do nothing.
+    free : gives the (n, n) covariance of what an unknown cause of unit size may do here; None where it may do nothing.
     nuisances : (n, k) what the observation's own nuisances change, per standard uncertainty of each; none where it has none.
     sections : name of a record or map among several -> its part of the data.
     Arrays are never written to: the covariance is factorised once.
@@ -30,7 +30,7 @@ class Block:
     residual: Float[np.ndarray, " n"]
     covariance: Float[np.ndarray, "n n"]
     tangents: Mapping[str, Float[np.ndarray, " n"]]
-    free: Float[np.ndarray, "n n"] | None = None
+    free: Callable[[], FloatArray] | None = None
     nuisances: Float[np.ndarray, "n k"] | None = None
     sections: Mapping[str, slice] = field(default_factory=dict)
 

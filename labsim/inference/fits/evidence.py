@@ -47,6 +47,15 @@ def log_share_inside(low: float, high: float, mean: float, sigma: float) -> floa
     return float(log_ndtr(above) + math.log1p(-min(math.exp(log_ndtr(below) - log_ndtr(above)), MOST_CUT)))
 
 
+def cut_moments(low: float, high: float, mean: float, sigma: float) -> tuple[float, float]:
+    """Mean and variance of a Gaussian between two limits, in its own: (mean - its own)/σ and variance/σ²."""
+    below, above = (low - mean) / sigma, (high - mean) / sigma
+    norm = log_share_inside(low, high, mean, sigma) + 0.5 * math.log(2.0 * math.pi)
+    left, right = (math.exp(-0.5 * limit * limit - norm) for limit in (below, above))
+    first = left - right
+    return first, max(1.0 + left * (below - first) - right * (above - first), 0.0)
+
+
 def integrate_linear(design: FloatArray, data: FloatArray, limits: Sequence[tuple[float, float]]) -> float:
     """ln of the integral of exp(-χ²/2), χ² = |data - design x|², over x between limits, about its top there.
 

@@ -13,10 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.linalg import block_diag
 from scipy.spatial.distance import cdist
 
 from ...ct.project import project
@@ -261,10 +262,20 @@ class CompactedZones:
 
     @cached_property
     def likeness(self) -> list[FloatArray]:
-        """(cells, cells) correlations of each of the solver's errors in NUMERICAL by the places of the cells."""
+        """(n, n) correlations of each of the solver's errors in NUMERICAL by the places of the cells; none of the depths."""
         places = np.concatenate([zone.observed.about_tip for zone in self.zones])
-        apart = cdist(places, places, "sqeuclidean")
-        return [np.exp(-0.5 * apart / length**2) for _share, length in NUMERICAL]
+        cells = self._cells
+        found: list[FloatArray] = []
+        for _share, length in NUMERICAL:
+            alike = np.zeros((cells.size,) * 2)
+            alike[np.ix_(cells, cells)] = np.exp(-0.5 * cdist(places, places, "sqeuclidean") / length**2)
+            found.append(alike)
+        return found
+
+    @cached_property
+    def _cells(self) -> np.ndarray:
+        """Which of the data are cells: the last of each scan is its depth, (n,) bool."""
+        return np.concatenate([np.arange(n + 1) < n for n in (len(z.observed.about_tip) for z in self.zones)])
 
     def begin(self) -> FloatArray:
         return np.array([math.log(zone.observed.scan.speed.value) for zone in self.zones])
@@ -283,26 +294,20 @@ class CompactedZones:
         ]
         sections = lay_out(part.residual.size for part in parts)
         own = np.concatenate([np.full(part.residual.size, k) for k, part in enumerate(parts)])
-        cells = np.ones(own.size, dtype=bool)
-        cells[[section.stop - 1 for section in sections]] = False
         alike = self._find_alike(parts)[np.ix_(own, own)]
-        contrast = np.concatenate([part.contrast for part in parts])
+        contrasts = [np.append(part.contrast, 0.0) for part in parts]
+        contrast = np.concatenate(contrasts)
         covariance = np.zeros(alike.shape)
         for (share, _length), places in zip(NUMERICAL, self.likeness, strict=True):
             error = share * contrast + NUMERICAL_FLOOR / math.sqrt(len(NUMERICAL))
-            covariance[np.ix_(cells, cells)] += np.outer(error, error) * places
+            covariance += np.outer(error, error) * places
         solver = np.concatenate([part.solver for part in parts])
         covariance = (covariance + solver @ solver.T) * alike
         grey = np.concatenate([part.grey for part in parts])
         covariance += np.outer(grey, grey)
-        # what an unknown cause changes is alike in all cells of like contrast of one scan
-        free = np.zeros(alike.shape)
         speeds = np.zeros((own.size, len(parts)))
         for k, (part, section) in enumerate(zip(parts, sections, strict=True)):
             covariance[section, section] += part.own
-            size = np.append(part.contrast, 0.0)
-            apart = np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))
-            free[section, section] = np.outer(size, size) * np.exp(-0.5 * apart**2)
             speeds[section, k] = part.speed
         return Block(
             np.concatenate([part.residual for part in parts]),
@@ -311,7 +316,7 @@ class CompactedZones:
                 name: np.concatenate([part.tangents[name] for part in parts])
                 for name in ("ln_p_m", *perturbations)
             },
-            free,
+            partial(_let_contrasts_change, contrasts),
             speeds,
             {zone.name: section for zone, section in zip(self.zones, sections, strict=True)},
         )
@@ -331,6 +336,15 @@ class CompactedZones:
         best = np.clip(block.nuisances.T @ weighted, -3.0, 3.0)
         moved = self.begin() + best * spread
         return moved, 0.5 * float((np.abs(moved - nuisances) / spread).max())
+
+
+def _let_contrasts_change(contrasts: Sequence[FloatArray]) -> FloatArray:
+    """(n, n) covariance of what an unknown cause changes: alike in all cells of like contrast of one scan."""
+    free = []
+    for size in contrasts:
+        apart = np.subtract.outer(size, size) / (0.3 * max(float(size.max()), 1e-12))
+        free.append(np.outer(size, size) * np.exp(-0.5 * apart**2))
+    return np.asarray(block_diag(*free))
 
 
 def _slope_along_z(observed: ObservedScan, cells: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -100,6 +101,11 @@ class Layering(Direct):
         covariance = np.diag(sigma**2) + SMOOTH**2 * same * np.exp(-0.5 * (apart / SMOOTH_LENGTH) ** 2)
         level = row * math.hypot(self.sigma, GREY * float(np.mean(data[row > 0])))
         covariance += np.outer(level, level) + POINT_SPREAD_SIGMA[1] ** 2 * np.outer(spread, spread)
-        # an unnamed layering is the same in all samples, and grows with nothing but depth
-        free = np.outer(row * expected, row * expected) * np.exp(-0.5 * (apart / FREE_LENGTH) ** 2)
-        return Block(data - expected, covariance, tangents, free)
+        return Block(
+            data - expected, covariance, tangents, partial(_let_layers_change, row * expected, apart)
+        )
+
+
+def _let_layers_change(filling_factor: FloatArray, apart: FloatArray) -> FloatArray:
+    """(n, n) covariance of an unnamed layering: the same in all samples, it grows with nothing but depth."""
+    return np.outer(filling_factor, filling_factor) * np.exp(-0.5 * (apart / FREE_LENGTH) ** 2)

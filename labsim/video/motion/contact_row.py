@@ -32,7 +32,7 @@ LAWS = (  # whether the force grows with the tip's area, powers of the speed in 
 BLUNT = 0.1  # odds of a force that sets in at once, before the rows are looked at
 LAW_BIAS = 0.02  # of the tip radius: rms of the row found less the true one on the independent curves in data/reference
 FINE = 1200  # steps in which the law is integrated
-SEARCHED = 60  # rows tried before the best is refined
+SEARCHED, AGAIN = 60, 20  # rows tried before the best is refined; about the best, once the motion is renewed
 RENEWALS = 4
 ROUNDS = 3
 
@@ -119,12 +119,12 @@ def _search(rows: _Rows, by_area: bool, powers: tuple[int, ...]) -> tuple[float,
     low, high = float(rows.row[3]), float(rows.row[-1]) - 1e-3 * float(np.ptp(rows.row))
     for turn in range(RENEWALS):
         profile = lambda row, motion=motion: _fit_law(rows, by_area, powers, fine, motion, row)[0]  # noqa: E731
-        grid = np.linspace(low, high, SEARCHED)
+        grid = np.linspace(low, high, AGAIN if turn else SEARCHED)
         heights = np.array([profile(row) for row in grid])
         best = int(np.argmin(heights))
-        if best in (0, SEARCHED - 1) and turn:
+        if best in (0, grid.size - 1) and turn:
             return None
-        beside = grid[max(best - 1, 0)], grid[min(best + 1, SEARCHED - 1)]
+        beside = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
         surface = float(minimize_scalar(profile, bounds=beside, method="bounded").x)
         chi_square, motion = _fit_law(rows, by_area, powers, fine, motion, surface)
         reach = 0.15 * (high - low) if turn else 0.3 * (high - low)
