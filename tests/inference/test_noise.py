@@ -54,6 +54,14 @@ def test_one_noisy_film_does_not_spoil_the_others(plain):
     assert first > 1.8 > 1.6 > max(others)
 
 
+def test_a_film_whose_motion_was_not_found_leaves_the_others_alone(plain):
+    """One fit that runs off by thousands of standard deviations made every drop say nothing."""
+    rng = np.random.default_rng(6)
+    first, *others = compare([spoil(drop, 1e4 if k == 0 else 1.0, rng) for k, drop in enumerate(plain)])
+    assert first > 1e3
+    assert others == pytest.approx([1.0] * len(others), abs=0.3)
+
+
 def test_the_stated_noise_stands_where_no_row_says_otherwise(plain):
     bare = [
         replace(drop, curve=replace(drop.curve, residual=np.full_like(drop.curve.residual, np.nan)))

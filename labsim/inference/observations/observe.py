@@ -23,6 +23,7 @@ from .observe_acceleration import ObservedImpact, observe_impact
 from .observe_push import ObservedPush, observe_push
 
 MARGIN = 4  # frames kept after the depth has stopped growing
+ASTRAY = 3.0  # times the scatter of the middle film, from which on a film says nothing of the others
 DUST_PARAMETERS = 3  # that the rows in the dust tell of a motion; contact and speed are those of free fall
 # Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
 SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
@@ -115,9 +116,13 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
 def judge_noise(seen: Sequence[Observed]) -> list[Observed]:
     """The drops with the noise that their rows have in the dust, where the stated one is that of all frames at best: light and
     focus change along a film. The stated error bars count as NOISE_KNOWN frames against all films, these as much against one.
+    A film that scatters beyond the middle one by more than ASTRAY says nothing of the others: its motion was not found.
     """
     scatter = {each.name: _scatter_in_dust(each) for each in seen if isinstance(each, ObservedDrop)}
-    squares, freedom = np.sum([*scatter.values(), (0.0, 0)], axis=0)
+    shown = [(square + NOISE_KNOWN) / (free + NOISE_KNOWN) for square, free in scatter.values()]
+    most = ASTRAY**2 * float(np.median(shown or 1.0))
+    alike = [one for one, each in zip(scatter.values(), shown, strict=True) if each <= most]
+    squares, freedom = np.sum([*alike, (0.0, 0)], axis=0)
     common = (squares + NOISE_KNOWN) / (freedom + NOISE_KNOWN)
     own = {n: (square + NOISE_KNOWN * common) / (free + NOISE_KNOWN) for n, (square, free) in scatter.items()}
     return [

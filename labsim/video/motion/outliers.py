@@ -71,10 +71,14 @@ def fit_without_outliers(
     start: Sequence[float],
     used: np.ndarray,
 ) -> tuple[Motion, np.ndarray] | None:
-    """One model fitted, its outliers dropped and taken back until they stand still: (motion, frames used)."""
+    """One model fitted, its outliers dropped and taken back until they stand still: (motion, frames that it was fitted to).
+
+    Where they do not within ROUNDS, as of a model that loses its frames one by one, the last fit stands with the frames it had.
+    """
     seen: list[np.ndarray] = []
     motion: Motion | None = None
     for _ in range(ROUNDS):
+        fitted = used
         motion = fit_motion(time[used], depth[used], error[used], degree, ending, start)
         if motion is None:
             return None
@@ -86,4 +90,4 @@ def fit_without_outliers(
         seen.append(used)
         used, start = renewed, tuple(motion.ends)
     assert motion is not None
-    return motion, used
+    return motion, fitted
