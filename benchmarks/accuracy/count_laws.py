@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 from benchmarks.accuracy.blind import read_rows
 from benchmarks.accuracy.draw_accuracy import find_interval
-from benchmarks.accuracy.hidden_laws import WHERE, HiddenLaw, find_law, find_place
+from benchmarks.accuracy.hidden_laws import LARGE, SIZE, WHERE, HiddenLaw, find_law, find_place
 from labsim.effects.terms import list_terms
 
 MOST = 3  # formulas that are named
@@ -77,6 +77,14 @@ def main() -> None:
         p_m, share = row["p_m"], math.nan
         if row["law"] and row["first"] == "unknown":
             middle, width = row["law"][0]["ln_p_m"]
+            if truth.get(
+                "small_strength"
+            ):  # whose p_m is that of the large tip, a formula's that of none in particular
+                middle += sum(
+                    value * float(list_terms()[name].shape(np.array([1e3 * LARGE]))[0])
+                    for name, (place, value, _) in row["law"][0]["terms"].items()
+                    if place == SIZE
+                )
             strength = abs(middle - math.log(truth["pm"])) < WITHIN * math.hypot(width, CODES)
             p_m = math.exp(middle)
             before, after = row["law"][0]["rms"]
