@@ -77,9 +77,8 @@ def main() -> None:
         p_m, share = row["p_m"], math.nan
         if row["law"] and row["first"] == "unknown":
             middle, width = row["law"][0]["ln_p_m"]
-            if truth.get(
-                "small_strength"
-            ):  # whose p_m is that of the large tip, a formula's that of none in particular
+            # the truth's p_m is that of the large tip there, a formula's that of none in particular
+            if truth.get("small_strength"):
                 middle += sum(
                     value * float(list_terms()[name].shape(np.array([1e3 * LARGE]))[0])
                     for name, (place, value, _) in row["law"][0]["terms"].items()

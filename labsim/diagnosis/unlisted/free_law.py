@@ -20,7 +20,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...inference.emulation.grid import Request
 from ...inference.emulation.nodes import amplitude_nodes, place_strength
 from ...inference.fits.blocks import Block, solve_globals
-from ...inference.fits.evidence import cut_moments, log_share_inside
+from ...inference.fits.evidence import cut_gaussian
 from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_p_value
 from ...inference.fits.steps import move_nuisances
 from ...inference.fits.tangents import linearise_at
@@ -221,9 +221,9 @@ def integrate(
     evidence -= 0.5 * log_information + len(hats) * math.log(size) + math.log(limits[1] - limits[0])
     low, high = (limit - found.log_p_m for limit in limits)
     sigma = math.sqrt(covariance[0, 0])
-    evidence += log_share_inside(low, high, best[0], sigma)
     # a Gaussian cut in its first coordinate: the others follow that one's mean and variance
-    mean, variance = cut_moments(low, high, float(best[0]), sigma)
+    log_share, mean, variance = cut_gaussian(low, high, float(best[0]), sigma)
+    evidence += log_share
     along = covariance[0] / sigma
     best = best + along * mean
     return Marginal(float(evidence), best, covariance + np.outer(along, along) * (variance - 1.0))

@@ -84,7 +84,7 @@ def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) ->
             continue
         shape = law_covariance(coordinates, freedom.scales) if freedom.scales else None
         for size in SIZES:
-            free = [inflate(Block(drops.residual, drops.covariance, drops.tangents), shape, size)]
+            free = [inflate(drops, shape, size)]
             free += [
                 inflate(block, change if kind in freedom.kinds else None, MAP_SHARE * size)
                 for kind, block, change in zip(kinds[1:], fit.blocks[1:], changes, strict=True)

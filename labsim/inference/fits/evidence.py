@@ -47,13 +47,14 @@ def log_share_inside(low: float, high: float, mean: float, sigma: float) -> floa
     return float(log_ndtr(above) + math.log1p(-min(math.exp(log_ndtr(below) - log_ndtr(above)), MOST_CUT)))
 
 
-def cut_moments(low: float, high: float, mean: float, sigma: float) -> tuple[float, float]:
-    """Mean and variance of a Gaussian between two limits, in its own: (mean - its own)/σ and variance/σ²."""
+def cut_gaussian(low: float, high: float, mean: float, sigma: float) -> tuple[float, float, float]:
+    """ln of the share of a Gaussian between two limits, and what lies there: (its mean - the whole one's)/σ, its variance/σ²."""
     below, above = (low - mean) / sigma, (high - mean) / sigma
-    norm = log_share_inside(low, high, mean, sigma) + 0.5 * math.log(2.0 * math.pi)
+    log_share = log_share_inside(low, high, mean, sigma)
+    norm = log_share + 0.5 * math.log(2.0 * math.pi)
     left, right = (math.exp(-0.5 * limit * limit - norm) for limit in (below, above))
     first = left - right
-    return first, max(1.0 + left * (below - first) - right * (above - first), 0.0)
+    return log_share, first, max(1.0 + left * (below - first) - right * (above - first), 0.0)
 
 
 def integrate_linear(design: FloatArray, data: FloatArray, limits: Sequence[tuple[float, float]]) -> float:

@@ -263,19 +263,15 @@ class CompactedZones:
     @cached_property
     def likeness(self) -> list[FloatArray]:
         """(n, n) correlations of each of the solver's errors in NUMERICAL by the places of the cells; none of the depths."""
-        places = np.concatenate([zone.observed.about_tip for zone in self.zones])
-        cells = self._cells
+        each = [zone.observed.about_tip for zone in self.zones]
+        places = np.concatenate(each)
+        cells = np.concatenate([np.append(np.ones(len(one), bool), False) for one in each])
         found: list[FloatArray] = []
         for _share, length in NUMERICAL:
             alike = np.zeros((cells.size,) * 2)
             alike[np.ix_(cells, cells)] = np.exp(-0.5 * cdist(places, places, "sqeuclidean") / length**2)
             found.append(alike)
         return found
-
-    @cached_property
-    def _cells(self) -> np.ndarray:
-        """Which of the data are cells: the last of each scan is its depth, (n,) bool."""
-        return np.concatenate([np.arange(n + 1) < n for n in (len(z.observed.about_tip) for z in self.zones)])
 
     def begin(self) -> FloatArray:
         return np.array([math.log(zone.observed.scan.speed.value) for zone in self.zones])
