@@ -12,6 +12,7 @@ from labsim.effects.terms import list_terms
 AREA = math.pi * SMALL**2
 STRENGTH, SPEED, DEPTH, SIZE = "strength", "force of speed", "force of depth", "strength of size"
 MASS, SAMPLE, CAMERA = "mass", "sample", "camera"
+NEAR = 1.5  # of a depth: as thick as a layer is, which is half of how deep it lies
 # a place of a law, or the words of one without a formula -> where that is; others are their own names
 WHERE = {
     "clock of row": CAMERA,
@@ -21,6 +22,10 @@ WHERE = {
     "strength of filling factor": STRENGTH,
     "strength of plastic strain": STRENGTH,
     "shear strength of plastic strain": STRENGTH,
+    "force of depth in mm": DEPTH,
+    "force alike for all tips": DEPTH,
+    "force on the rim": DEPTH,
+    "strength of depth": SAMPLE,
     "undisturbed dust": SAMPLE,
     "depth and speed and undisturbed dust": SAMPLE,
 }
@@ -45,11 +50,21 @@ def find_place(term: str) -> str:
     return WHERE.get(place, place)
 
 
+def _list_near(families: tuple[str, ...], depth: float) -> dict[str, float | None]:
+    """Terms of these families that stand within NEAR of a depth in mm."""
+    return {
+        name: None
+        for name, term in list_terms().items()
+        if name.startswith(families)
+        and term.at is not None
+        and abs(math.log(term.at / depth)) < math.log(NEAR)
+    }
+
+
 def find_law(truth: dict) -> HiddenLaw | None:
     """Of one campaign's truth; none where a cause of the catalogue is hidden."""
     forces, dust, measure = truth["dyn"], truth["mat"], truth["measure"]
     profile = (truth["profile"] or {}).get("kind")
-    films: dict[str, float | None] = dict.fromkeys(("surface_layer", "film_at_0_5", "thick_surface_layer"))
     damage: dict[str, float | None] = dict.fromkeys(("shear_damage", "slow_shear_damage", "shear_softening"))
     if "inertial" in forces:
         return HiddenLaw((SPEED,), {"inertial_drag": forces["inertial"] / AREA})
@@ -58,15 +73,17 @@ def find_law(truth: dict) -> HiddenLaw | None:
     if "shaft_drag" in forces:  # goes with depth times the square of the speed
         return HiddenLaw((SPEED, DEPTH), {"inertial_drag": None, "depth_spring": None})
     if "pull" in forces:
-        return HiddenLaw((DEPTH,), {"constant_pressure": None})  # a force that does not grow with the tip
-    if "film" in forces:
-        return HiddenLaw((DEPTH,), films)
+        return HiddenLaw((DEPTH,), {"rim_pull": forces["pull"] / (2 * math.pi * SMALL), "pull": None})
+    if "film" in forces:  # a force down to a depth in m
+        near = _list_near(("skin_to", "film_at"), 1e3 * forces["film"][1])
+        return HiddenLaw((DEPTH, SAMPLE), {**near, **dict.fromkeys(("surface_layer", "film_at_0_5"))})
     if "gathered" in forces:
         return HiddenLaw((MASS,), {"gathered_mass": forces["gathered"]})
     if "accrete" in forces:
         return HiddenLaw((MASS,), {"stuck_mass": forces["accrete"], "gathered_mass": forces["accrete"]})
     if "interface" in dust:
-        return HiddenLaw((DEPTH, SAMPLE), films)
+        near = _list_near(("layer_at", "film_at"), 1e3 * dust["interface"][0])
+        return HiddenLaw((DEPTH, SAMPLE), {**near, "film_at_0_5": None})
     if profile == "layers":
         return HiddenLaw((DEPTH, SAMPLE), {})
     if truth.get("small_strength"):

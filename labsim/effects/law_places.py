@@ -1,10 +1,10 @@
 """Where the equations, or the clock of a camera, have a place for a law that is not in them, one record each.
 
-    m (1 + d(z/a) + k(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) exp(f(a)), Y (1 + h(ε))]
-                                           - A b(z/a) - A c(v) - m k'(z/a) v²/a
+    m (1 + d(z/a) + k(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) (1 + l(z0)) exp(f(a)), Y (1 + h(ε))]
+                                           - A (b(z/a) + s(z)) - p(z) - 2π a q(z) - A c(v) - m k'(z/a) v²/a
 
-m is the mass of the projectile, A the cross-section of its tip, a its radius, ε the plastic shear strain of the dust. A force is
-a pressure, so that one law holds for all sizes.
+m is the mass of the projectile, A the cross-section of its tip, a its radius; ε the plastic shear strain of the dust, z0 where it
+lay. Most forces are pressures, so that one law holds for all sizes.
 """
 
 from __future__ import annotations
@@ -22,6 +22,17 @@ from .contract import Instrument
 Knots = tuple[tuple[float, float], ...]
 MOST_DELAY = 0.6  # s/m: a tip of 1 m/s must not outrun the rows
 LEAST = 0.1  # of the strength that p_m gives, which a law must leave
+IN_MM = (
+    0.0,
+    0.04,
+    0.063,
+    0.1,
+    0.16,
+    0.25,
+    0.4,
+    0.63,
+    1.0,
+)  # of the deepest drop: a layer is felt by its share of the way
 
 
 @dataclass(frozen=True)
@@ -29,9 +40,9 @@ class LawPlace:
     """over, unit : what a law goes with there; value_unit : of what it gives; words : that in front of a formula.
 
     shown, shown_unit : that at an axis. reach : of what it goes with, as far as drops come. least : smallest value, a smaller one
-    ``breaks`` physics; of a camera's, and most, ends of its coefficients. scale : a usual value. knots : of what it goes with,
-    for a law without a formula; none where no runs are needed to say what it changes. add : to a drop, a table of knots; see : to
-    a camera, a coefficient at a size of its pixels (m).
+    ``breaks`` physics; of a camera's, and most, ends of its coefficients. scale : a usual value. knots : of what it goes with, in
+    shares of the deepest drop where that is mm, for a law without a formula; none where no runs say what it changes. add : to a
+    drop, a table of knots; see : to a camera, a coefficient at a size of its pixels (m).
     """
 
     name: str
@@ -75,20 +86,30 @@ def _label(words: str, unit: str) -> str:
     return words if unit == "1" else f"{words} ({unit})"
 
 
-def _add_share(key: str) -> Callable[[DropSetting, Knots], DropSetting]:
-    """What adds a share, over the first column of a table, to a strength: by the factors that the setting's key holds."""
+def _add_share(key: str, unit: float = 1.0) -> Callable[[DropSetting, Knots], DropSetting]:
+    """What adds a share, over the first column of a table in this unit, to a strength: by the factors that the setting's key
+    holds."""
 
     def add(setting: DropSetting, table: Knots) -> DropSetting:
-        factors = tuple((place, max(1.0 + more, LEAST)) for place, more in table)
+        factors = tuple((place * unit, max(1.0 + more, LEAST)) for place, more in table)
         return setting.replace(**{key: combine(getattr(setting, key), factors, product=True)})
 
     return add
 
 
-def _add_pressure_of_depth(setting: DropSetting, table: Knots) -> DropSetting:
-    radius, area = setting.projectile.tip_radius, _section(setting)
-    table = tuple((knot * radius, value * area) for knot, value in table)
-    return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+def _add_force_of_depth(
+    pressure: Callable[[float], float], unit: float | None = 1e-3
+) -> Callable[[DropSetting, Knots], DropSetting]:
+    """What adds a force over depth. pressure : Pa on the cross-section that one unit of the force is, of the tip's radius in m;
+    unit : of the depth, m, None for the tip's radius."""
+
+    def add(setting: DropSetting, table: Knots) -> DropSetting:
+        radius = setting.projectile.tip_radius
+        force, length = pressure(radius) * _section(setting), unit or radius
+        table = tuple((knot * length, value * force) for knot, value in table)
+        return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+
+    return add
 
 
 def _add_pressure_of_speed(setting: DropSetting, table: Knots) -> DropSetting:
@@ -158,7 +179,27 @@ LAW_PLACES = {
         LawPlace(
             "force of depth", "depth", "tip radii", "Pa",
             "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
-            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_pressure_of_depth,
+            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_force_of_depth(lambda a: 1.0, None),
+        ),
+        LawPlace(
+            "force of depth in mm", "depth", "mm", "Pa",
+            "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
+            100.0, -math.inf, "", 400.0, IN_MM, _add_force_of_depth(lambda a: 1.0),
+        ),
+        LawPlace(
+            "force alike for all tips", "depth", "mm", "mN",
+            "a force upwards, alike for all tips, of", "force upwards", "mN",
+            100.0, -math.inf, "", 0.3, (0.0, 1.0), _add_force_of_depth(lambda a: 1e-3 / (math.pi * a**2)),
+        ),
+        LawPlace(
+            "force on the rim", "depth", "mm", "N/m",
+            "a force upwards on the tip, over its circumference, of", "force upwards", "N/m",
+            100.0, -math.inf, "", 0.1, (0.0, 1.0), _add_force_of_depth(lambda a: 2.0 / a),
+        ),
+        LawPlace(
+            "strength of depth", "depth where dust lay", "mm", "1",
+            "a compressive strength of the dust where it lay that is more by a share of", "more strength", "%",
+            100.0, LEAST - 1.0, "leaves no strength", 1.0, IN_MM, _add_share("strength_of_depth", 1e-3),
         ),
         LawPlace(
             "force of speed", "speed", "m/s", "Pa",

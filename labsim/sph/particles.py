@@ -17,7 +17,7 @@ from .tips import make_profile
     X, Z, U, W, MASS, AREA, RING, WEIGHT, SOUND, DENSITY, INITIAL, SXX, SZZ, SXZ, PRESSURE, WORK, ELASTIC,
     HEAT, GXX, GXZ, GZZ, LXX, LXZ, LZX, LZZ, MXX, MXZ, MZX, MZZ, FX, FZ, DXX, DXZ, DZX, DZZ, SHEAR,
     DISTANCE, NX, NZ, THICKNESS, GRIP, WALL_RATE, COMPACTION, DIFFUSIVITY, EXCHANGE, EXCHANGED,
-    CRUSHING, PUSH_X, PUSH_Z, YIELD_SQUARE,
+    CRUSHING, PUSH_X, PUSH_Z, YIELD_SQUARE, LAID,
 ) = range(len(Rows._fields))  # fmt: skip
 
 WALL_LAYERS = 3  # of particles held still at the sides and the bottom
@@ -51,6 +51,7 @@ def fill_at_rest(
     own, sound = law.start(setting, phi, pressure)
     state = np.zeros((len(Rows._fields) + len(own), x.size))
     state[X], state[Z] = x, z
+    state[LAID] = -z
     state[INITIAL] = phi
     state[DENSITY] = phi * setting.monomer_density
     state[RING] = x if setting.geometry == "axisymmetric" else 1.0

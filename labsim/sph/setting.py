@@ -77,6 +77,8 @@ class DropSetting:
         Filling factor and factor on Σ; tables are linear between their rows.
     strength_of_strain, shear_of_strain : tuple of (float, float)
         Plastic shear strain and factor on Σ, or on Y.
+    strength_of_depth : tuple of (float, float)
+        m below the surface, of undisturbed dust, and factor on the Σ that this dust keeps.
     force_of_depth, force_of_speed, mass_of_depth, gathered_of_depth : tuple of (float, float)
         m and N upwards; m/s and N against the motion; m and kg of dust that move with the tip: it has the tip's speed when it
         sticks, or lies still, so that the tip gives it its momentum.
@@ -107,6 +109,7 @@ class DropSetting:
     strength_shape: tuple[tuple[float, float], ...] = ()  # (φ, factor on Σ), linear between, constant beyond
     strength_of_strain: tuple[tuple[float, float], ...] = ()  # (plastic shear strain, factor on Σ)
     shear_of_strain: tuple[tuple[float, float], ...] = ()  # (plastic shear strain, factor on Y)
+    strength_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m of undisturbed dust, factor on its Σ)
     force_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m, upward force N), linear between
     force_of_speed: tuple[
         tuple[float, float], ...

@@ -1,6 +1,7 @@
 """What the compiled loop works on, by name: records of rows and of numbers. A row is an array with one number a particle.
 
 Row 0 to n - 1 are the particles, behind them their mirror images. A law's own rows and numbers are records of its own file.
+``laid`` is the depth, m, at which a particle lay at the start.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ Rows = namedtuple(
     "Rows",
     "x z u w mass area ring weight sound density initial sxx szz sxz pressure work elastic heat "
     "gxx gxz gzz lxx lxz lzx lzz mxx mxz mzx mzz fx fz dxx dxz dzx dzz shear distance nx nz "
-    "thickness grip wall_rate compaction diffusivity exchange exchanged crushing push_x push_z yield_square",
+    "thickness grip wall_rate compaction diffusivity exchange exchanged crushing push_x push_z yield_square laid",
 )
 
 LOG = (

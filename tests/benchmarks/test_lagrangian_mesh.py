@@ -236,6 +236,26 @@ def test_what_plastic_strain_does_is_the_same_in_labsim(hidden, law):
     assert ours[1] / ours[0] == pytest.approx(moved[1] / moved[0], abs=0.007)
 
 
+@pytest.mark.parametrize("middle, factor, moved", [(0.35e-3, 3.0, -0.061), (0.3e-3, 0.25, 0.084)])
+def test_a_thin_layer_of_another_strength_does_the_same_in_labsim(middle, factor, moved):
+    """0.15 mm thick, one and a half spacings of labsim and six cells of the mesh: alike to 0.6 % of the depth."""
+    edges = (middle - 0.075e-3, middle + 0.075e-3)
+    layer = (
+        (edges[0] - 1e-7, 1.0), (edges[0] + 1e-7, factor), (edges[1] - 1e-7, factor), (edges[1] + 1e-7, 1.0),
+    )  # fmt: skip
+    setting = DropSetting(
+        Projectile("hemisphere", RADIUS, mesh.BEAD * RADIUS**3), 0.5, Material(), spacing=RADIUS / 5
+    )
+    numerics = mesh.Numerics(cells=20.0)
+    theirs = [
+        mesh.run_drop(mesh.Dust(interface=each), RADIUS, 0.5, numerics).stopping_depth
+        for each in ((0.0, 0.0, 1.0), (middle, 0.15e-3, factor))
+    ]
+    ours = [simulate(each).penetration_depth for each in (setting, setting.replace(strength_of_depth=layer))]
+    assert theirs[1] / theirs[0] - 1.0 == pytest.approx(moved, abs=0.002)
+    assert ours[1] / ours[0] == pytest.approx(theirs[1] / theirs[0], abs=0.006)
+
+
 def test_after_its_stop_a_drop_comes_up_and_closes_its_book():
     stop = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
     rest = mesh.run_drop(mesh.Dust(), RADIUS, 0.30, after=2.0)

@@ -45,7 +45,12 @@ def test_every_term_is_what_its_page_says(name):
         changed = add_term(SETTING, term, max(low, -100.0))
         [hardest] = [
             law
-            for law in (changed.strength_shape, changed.strength_of_strain, changed.shear_of_strain)
+            for law in (
+                changed.strength_shape,
+                changed.strength_of_strain,
+                changed.shear_of_strain,
+                changed.strength_of_depth,
+            )
             if law
         ]
         assert min(factor for _, factor in hardest) >= LEAST

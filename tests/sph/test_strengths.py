@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 import labsim
-from labsim.records import Material
-from labsim.sph import sirono
+from labsim.records import Material, Projectile
+from labsim.sph import DropSetting, simulate, sirono
 from labsim.sph.bodies import set_body
 from labsim.sph.materials import porous_dust as dust
 from labsim.sph.particles import fill_at_rest, name_rows
@@ -230,3 +230,31 @@ def test_strength_goes_with_the_plastic_strain(key, power, slope):
     for each in (one, plain):
         each.move(0.3, 500, shear=0.4)
     assert one.row.sxz[0] == plain.row.sxz[0] and one.pressure == plain.pressure
+
+
+def test_a_factor_on_the_strength_at_all_depths_is_one_on_the_strength():
+    """Bit for bit the run in which Σ(φ) itself is multiplied; a factor of one changes nothing that counts."""
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.3, Material(), spacing=5e-4 / 4)
+    plain, one, deep, everywhere = (
+        simulate(setting.replace(**terms))
+        for terms in (
+            {},
+            {"strength_of_depth": ((0.0, 1.0),)},
+            {"strength_of_depth": ((0.0, 1.5),)},
+            {"strength_shape": ((0.0, 1.5),)},
+        )
+    )
+    assert one.penetration_depth == pytest.approx(plain.penetration_depth, rel=1e-9)
+    assert deep.penetration_depth == pytest.approx(everywhere.penetration_depth, rel=1e-9)
+    assert deep.penetration_depth < 0.95 * plain.penetration_depth
+
+
+def test_dust_keeps_the_strength_of_the_depth_where_it_lay():
+    """Inside a layer Σ is the factor times the usual one; half in it (to half an entry of the table), the harmonic mean."""
+    material, layer = Material(p_m=1300.0), ((1.0e-3, 1.0), (1.0e-3 + 1e-9, 3.0), (2.0e-3, 3.0))
+    usual = float(sirono.compressive_strength(np.array([0.2]), material)[0])
+    for depth, factor in ((0.2e-3, 1.0), (1.5e-3, 3.0), (1.0025e-3, 1.5)):
+        lump = OneParticle(material, strength_of_depth=layer)
+        lump.row.laid[:] = depth
+        lump.move(0.2, 4000)
+        assert lump.pressure == pytest.approx(factor * usual, rel=2e-3)

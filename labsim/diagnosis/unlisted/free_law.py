@@ -2,7 +2,8 @@
 
     m (1 + Σ_m d_m h_m(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + Σ_m e_m h_m(φ))] - A Σ_m b_m h_m(z/a) - A Σ_m c_m h_m(v)
 
-h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. What every hat changes of drops
+h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. Some go with the depth in mm, as
+layers of the sample do (law_places.py). What every hat changes of drops
 and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian
 about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/free-law.md. Mass d may not
 shrink, which such coefficients do not know: its hats serve formulas (learned_law.py) alone.
@@ -44,6 +45,10 @@ EMBEDDED = {  # freedom -> the laws that are free together
     "strength of filling factor": ("strength of filling factor",),
     "force of depth": ("force of depth",),
     "force of speed": ("force of speed",),
+    "strength of depth": ("strength of depth",),
+    "force of depth in mm": ("force of depth in mm",),
+    "force alike for all tips": ("force alike for all tips",),
+    "force on the rim": ("force on the rim",),
     "strength and forces": ("strength of filling factor", "force of depth", "force of speed"),
 }
 

@@ -31,6 +31,8 @@ from ...sph import DropSetting
 STEP = 0.3  # of a hat when it is simulated
 USUAL = 0.4  # of a law's scale: half of the coefficients are within that, where their terms are largest
 FALLING = 1.05  # of the impact speed, more than any drop gains by its weight in the dust
+BEFORE = 3.0  # tip radii below the tip, from which on it is not felt
+THIN = 0.15  # of the smallest tip's radius: thinner layers are lost between particles
 
 
 @dataclass(frozen=True)
@@ -65,25 +67,34 @@ class FreeLaw:
 
 def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
     """The laws that are simulated, with the hats that these drops and scans reach."""
-    deepest, fastest = 0.0, 0.0
+    deepest, deepest_mm, fastest = 0.0, 0.0, 0.0
     for observation, nuisances in zip(problem.observations, fit.nuisances, strict=True):
         if isinstance(observation, Tracks):
             instants = observation.instants(nuisances)
             fastest = max([fastest, *(math.exp(instant.log_speed) for instant in instants)])
-            depths = (model.deepest / model.radius for model in observation.models)
-            deepest = max([deepest, *depths])
+            deepest = max([deepest, *(model.deepest / model.radius for model in observation.models)])
+            deepest_mm = max([deepest_mm, *(1e3 * model.deepest for model in observation.models)])
         elif isinstance(observation, CompactedZones):
             observed = [zone.observed for zone in observation.zones]
             deepest = max([deepest, *(each.map.tip_depth / each.radius for each in observed)])
+            deepest_mm = max([deepest_mm, *(1e3 * each.map.tip_depth for each in observed)])
             fastest = max(fastest, math.exp(float(nuisances.max())))
+    radii = {group.projectile.tip_radius for group in problem.groups}
+    thinnest = THIN * 1e3 * min(radii)
     laws = []
     for place in LAW_PLACES.values():
         if place.over == "filling factor":
             level, most = problem.campaign.sample.filling_factor, problem.campaign.material.phi_2
             dust = tuple(round(level + more, 6) for more in place.knots if level + more < most)
             laws.append(FreeLaw(place, dust, dust, (dust[0], dust[-1])))
+        elif place.simulated and place.unit == "mm":
+            if place.over == "depth" and len(radii) == 1:
+                continue  # told from one that goes with tip radii by tips of two radii alone
+            depths = [float(f"{share * deepest_mm:.3g}") for share in place.knots]
+            grid = tuple(depth for depth in depths if depth == 0.0 or depth >= thinnest)
+            laws.append(FreeLaw(place, grid, grid, (0.0, deepest_mm)))
         elif place.simulated:
-            most = {"depth": deepest, "speed": fastest}.get(place.over, place.reach)
+            most = {"tip radii": deepest, "m/s": fastest}.get(place.unit, place.reach)
             # nought where nothing has moved: a force that does not change with speed is one of depth, a strength that does not
             # with strain is p_m
             reached = _reached(place.knots, most)[int(place.least > -math.inf) :]
@@ -123,11 +134,11 @@ def _add(law: FreeLaw, unit: Knots, knot: float, deepest: Mapping[DropSetting, f
         amplitude = values["amplitude"]
         if amplitude == 0.0:
             return setting
-        reached = {
-            "depth": deepest.get(setting, math.inf) / setting.projectile.tip_radius,
-            "speed": FALLING * setting.impact_speed,
-        }
-        if reached.get(law.over, math.inf) <= begins:
+        depth, radius = deepest.get(setting, math.inf), setting.projectile.tip_radius
+        if law.over != "depth":  # dust is crushed before the tip is there
+            depth += BEFORE * radius
+        reached = {"tip radii": depth / radius, "mm": 1e3 * depth, "m/s": FALLING * setting.impact_speed}
+        if reached.get(law.place.unit, math.inf) <= begins:
             return setting
         assert law.place.add is not None
         return law.place.add(setting, tuple((knot, amplitude * height) for knot, height in unit))
@@ -146,12 +157,15 @@ def add_terms(
     """
     places = {law.name: law for law in laws if law.knots}
     radii = np.unique([1e3 * group.projectile.tip_radius for group in problem.groups])
+    thinnest = THIN * float(radii.min())
     terms, units = {}, {}
     for name, term in list_terms().items():
         if name in problem.effects:
             continue
         if term.place in places:
             largest = find_peak(term, places[term.place])
+            if term.at is not None and not thinnest <= term.at <= places[term.place].reach[1]:
+                continue
         elif term.acts.over == "radius of the tip" and len(radii) > 1:
             largest = 0.5 * float(np.ptp(term.shape(radii)))  # what all tips have in common is p_m
         elif term.acts.see and any(isinstance(model, DropModel) for model in problem.tracks.models):

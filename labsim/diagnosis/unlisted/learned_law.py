@@ -40,7 +40,8 @@ ROUGH, ROUGH_SHARE = (
 # were among these (p12)
 MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of a place, likewise
-PEAKED = "force of depth"  # what a film changes has a peak where drops end in it, which few speeds miss
+# what a film changes has a peak where drops end in it, which few speeds miss
+PEAKED = ("force of depth", "force of depth in mm", "strength of depth")
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
@@ -213,9 +214,11 @@ def fit_siblings(
             begin = (start.log_p_m, {name: size * units[name]})
             with suppress(LabsimError):
                 siblings.append(
-                    fit_hypothesis(problem, (name,), begin, sparse=place != PEAKED, nuisances=start)
+                    fit_hypothesis(problem, (name,), begin, sparse=place not in PEAKED, nuisances=start)
                 )
-            if place != PEAKED and not explained:  # where the wrong form led, the right one's runs may fail
+            if (
+                place not in PEAKED and not explained
+            ):  # where the wrong form led, the right one's runs may fail
                 top = max([nominal.evidence, *(fit.evidence for fit in siblings)])
                 with suppress(LabsimError):
                     again = fit_from_strengths(problem, nominal, (name,), top)
@@ -239,7 +242,7 @@ def _list_places(
     for fit in sorted((*fits, *sparse), key=lambda fit: -fit.evidence):
         for name in fit.hypothesis if fit.evidence > top - behind else ():
             begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
-    return dict(sorted(begun.items(), key=lambda each: each[0] == PEAKED))
+    return dict(sorted(begun.items(), key=lambda each: each[0] in PEAKED))
 
 
 def _refine_leading(problem: Problem, fits: Sequence[Fit], most: int, refined: set[Hypothesis]) -> list[Fit]:

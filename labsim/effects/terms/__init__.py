@@ -28,7 +28,7 @@ class Term:
     """One formula with one coefficient c.
 
     place : a name of LAW_PLACES; unit : of c; formula : c times what, in plain signs; shape : (n,) compaction φ - φ0, or what
-    the law goes with -> (n,), in value unit per unit of c; source : where it is met.
+    the law goes with -> (n,), in value unit per unit of c; source : where it is met; at : where it is large, if only there.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Term:
     formula: str
     shape: Callable[[FloatArray], FloatArray]
     source: str
+    at: float | None = None
 
     @property
     def acts(self) -> LawPlace:
@@ -52,7 +53,7 @@ class Term:
             return least, self.acts.most
         if least == -math.inf:
             return -math.inf, math.inf
-        values = self.shape(np.linspace(0.0, self.acts.reach, KNOTS))
+        values = self.shape(np.append(np.linspace(0.0, self.acts.reach, KNOTS), self.at or 0.0))
         highest, lowest = float(values.max()), float(values.min())
         return (least / highest if highest > 0 else -math.inf, least / lowest if lowest < 0 else math.inf)
 
@@ -96,6 +97,8 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
         end = setting.material.phi_2 - begin
     elif term.acts.over == "speed":
         end = FASTEST * setting.impact_speed
+    elif term.acts.unit == "mm" and term.acts.simulated:
+        end = min(end, 1e3 * setting.extent[1])
     elif term.acts.over == "radius of the tip":
         radius = 1e3 * setting.projectile.tip_radius
         return add(setting, ((radius, coefficient * float(term.shape(np.array([radius]))[0])),))

@@ -20,6 +20,8 @@ MISSING = {
     "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
     "speed, about {size} % of the depth",
 }
+# after the unit of a force: what it goes with
+PER = {"Pa": " of its cross-section", "N/m": " of its circumference", "mN": ", alike for all tips,"}
 CLEAR = 2.0  # standard deviations from which a further law of several is named
 
 
@@ -55,10 +57,13 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
     if is_embedded(found):
         law = _rank(found)[0]
         value, sigma = clearest(law)[1:]
-        if law.law.over == "filling factor":
-            size = show_number(100 * value, "{:+.0f}")
-            return f"{size} ± {100 * sigma:.0f} %", f"of the strength {_say_place(law)}"
-        return f"{show_number(value, '{:+.0f}')} ± {sigma:.0f} Pa", f"on the tip {_say_place(law)}"
+        place = law.law.place
+        size = show_number(place.factor * value, f"{{:+.{_count_digits(place.factor * sigma)}f}}")
+        error = f"{place.factor * sigma:.{_count_digits(place.factor * sigma)}f} {place.shown_unit}"
+        return (
+            f"{size} ± {error}",
+            f"{'of the strength' if _is_strength(law) else 'on the tip'} {_say_place(law)}",
+        )
     if "depth" in MISSING[found.unknown.block]:
         return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"
     return None
@@ -67,21 +72,32 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
 def say_law(law: RecoveredLaw) -> str:
     """Its clearest knot: a strength 12 ± 3 % higher than p_m gives at a filling factor of 0.18."""
     _, value, sigma = clearest(law)
-    if law.law.over == "filling factor":
-        word = "more" if value > 0 else "less"
-        return f"{100 * abs(value):.0f} ± {100 * sigma:.0f} % {word} compressive strength {_say_place(law)}"
+    place = law.law.place
+    digits = _count_digits(place.factor * sigma)
+    size = f"{place.factor * abs(value):.{digits}f} ± {place.factor * sigma:.{digits}f} {place.shown_unit}"
+    if _is_strength(law):
+        return f"{size} {'more' if value > 0 else 'less'} compressive strength {_say_place(law)}"
     towards = {"depth": ("upwards", "downwards"), "speed": ("against the motion", "along the motion")}
     word = towards[law.law.over][value < 0]
-    return f"a force on the tip of {abs(value):.0f} ± {sigma:.0f} Pa of its cross-section {word} {_say_place(law)}"
+    return f"a force on the tip of {size}{PER[place.value_unit]} {word} {_say_place(law)}"
+
+
+def _is_strength(law: RecoveredLaw) -> bool:
+    return law.law.place.shown_unit == "%"
+
+
+def _count_digits(sigma: float) -> int:
+    """Decimals that show a standard deviation with one digit at least."""
+    return max(0, -math.floor(math.log10(sigma))) if sigma > 0 else 0
 
 
 def _say_place(law: RecoveredLaw) -> str:
-    knot = clearest(law)[0]
+    knot, unit = clearest(law)[0], law.law.place.unit
     if law.law.over == "filling factor":
         return f"at a filling factor of {knot:g}"
-    if law.law.over == "depth":
-        return f"at a depth of {knot:g} tip {'radius' if knot == 1 else 'radii'}"
-    return f"at {knot:g} m/s"
+    if unit == "tip radii" and knot == 1:
+        unit = "tip radius"
+    return f"at {knot:g} m/s" if law.law.over == "speed" else f"at a depth of {knot:g} {unit}"
 
 
 def clearest(law: RecoveredLaw) -> tuple[float, float, float]:

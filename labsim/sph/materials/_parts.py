@@ -25,6 +25,7 @@ TERMS = {
     "strength_shape": (),
     "strength_of_strain": (),
     "shear_of_strain": (),
+    "strength_of_depth": (),
     "crust_excess": 0.0,
     "filling_gradient": 0.0,
 }

@@ -5,7 +5,8 @@
 Σ, T, Y and K are those of ``labsim.sph.sirono``; the shear modulus is shear_to_bulk K. The deviatoric stress follows Jaumann's
 rate and returns radially to √(3 J2) = Y (von Mises, hoop stress included).
 Optional terms: Σ (1 + η ε̇ⁿ) (1 + μ log10(ε̇/ε̇0)) with ε̇ the rate of compression; trapped gas p + P0 ((1 - φi)/(1 - φ) - 1);
-factors on Σ and on Y that go with the plastic shear strain, the sum of (√(3 J2) - Y)/(3 G) over all returns to the yield surface.
+factors on Σ and on Y that go with the plastic shear strain, the sum of (√(3 J2) - Y)/(3 G) over all returns to the yield surface;
+a factor on Σ that dust keeps from the depth where it lay.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ CALIBRATED = parts.Calibrated("p_m", 300.0, 6000.0)
 TERMS = tuple(parts.TERMS)  # of a setting that it takes: all
 
 
+LAYERS_PER_SPACING = 20  # entries of the table of what goes with the depth
 STRAIN_TOP, STRAIN_SIZE = 4.0, 401  # of the table of what goes with the plastic strain; beyond it is constant
 
 sound_speed = parts.sound_speed
@@ -62,11 +64,14 @@ class State(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """strengths : over φ; of_strain, shear_of_strain : factors on Σ and Y over the plastic strain, empty where both are one."""
+    """strengths : over φ; of_strain, shear_of_strain : factors on Σ and Y over the plastic strain, empty where both are one;
+    of_depth : on Σ over the depth that dust lay at, empty where it is one; per_depth : its entries a metre."""
 
     strengths: sirono.Strengths
     of_strain: FloatArray
     shear_of_strain: FloatArray
+    of_depth: FloatArray
+    per_depth: float
 
 
 class Constants(NamedTuple):
@@ -94,7 +99,8 @@ def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -
 
 def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
     """What dust at rest may carry without crushing, Pa."""
-    return 0.8 * sirono.compressive_strength(phi, setting.material)
+    weakest = min((factor for _, factor in setting.strength_of_depth), default=1.0)
+    return 0.8 * min(weakest, 1.0) * sirono.compressive_strength(phi, setting.material)
 
 
 def resistance(setting: DropSetting) -> float:
@@ -126,8 +132,8 @@ def make_constants(setting: DropSetting) -> Constants:
     """The numbers of the law as the compiled update wants them."""
     material = setting.material
     (rate,) = parts.read_parameters(setting, parts.RATE)
-    strained = setting.strength_of_strain or setting.shear_of_strain
-    plain = material.bulk_exponent == 4.0 and not rate.on and setting.pore_gas == 0.0 and not strained
+    tabled = setting.strength_of_strain or setting.shear_of_strain or setting.strength_of_depth
+    plain = material.bulk_exponent == 4.0 and not rate.on and setting.pore_gas == 0.0 and not tabled
     extras = () if plain else (1,)
     return Constants(
         setting.monomer_density, material.bulk_modulus, material.bulk_exponent, material.shear_to_bulk,
@@ -138,14 +144,30 @@ def make_constants(setting: DropSetting) -> Constants:
 def make_tables(setting: DropSetting) -> Tables:
     """What the compiled update looks up."""
     strengths = sirono.tabulate_strengths(setting.material, setting.strength_shape)
+    of_depth, per_depth = _tabulate_layers(setting)
     if not (setting.strength_of_strain or setting.shear_of_strain):
-        return Tables(strengths, np.zeros(0), np.zeros(0))
+        return Tables(strengths, np.zeros(0), np.zeros(0), of_depth, per_depth)
     strain = np.linspace(0.0, STRAIN_TOP, STRAIN_SIZE)
-    factors = [
+    of_strain, shear_of_strain = (
         np.interp(strain, *np.asarray(law or ((0.0, 1.0),), dtype=float).T)
         for law in (setting.strength_of_strain, setting.shear_of_strain)
-    ]
-    return Tables(strengths, *factors)
+    )
+    return Tables(strengths, of_strain, shear_of_strain, of_depth, per_depth)
+
+
+def _tabulate_layers(setting: DropSetting) -> tuple[FloatArray, float]:
+    """Factors on Σ over the depth, and their number a metre. A particle has the harmonic mean over its spacing: layers bear one
+    pressure one after another, and what each gives way adds up."""
+    if not setting.strength_of_depth:
+        return np.zeros(0), 0.0
+    fine = LAYERS_PER_SPACING
+    depth = (np.arange(round(setting.extent[1] / setting.spacing) * fine + fine + 1) - fine / 2) * (
+        setting.spacing / fine
+    )
+    factor = np.interp(depth, *np.asarray(setting.strength_of_depth, dtype=float).T)
+    trapezoid = np.ones(fine + 1) / fine
+    trapezoid[[0, -1]] *= 0.5
+    return 1.0 / np.convolve(1.0 / factor, trapezoid, "valid"), fine / setting.spacing
 
 
 @compiled
@@ -154,6 +176,14 @@ def look_up_strain(factors, strain):
     position = min(strain * ((STRAIN_SIZE - 1) / STRAIN_TOP), STRAIN_SIZE - 1.001)
     cell = np.uint64(position)
     return factors[cell] + (position - cell) * (factors[cell + np.uint64(1)] - factors[cell])
+
+
+@compiled
+def look_up_depth(factors, position):
+    """A factor at a place in the table, counted in entries."""
+    place = min(max(position, 0.0), factors.size - 1.001)
+    cell = np.uint64(place)
+    return factors[cell] + (place - cell) * (factors[cell + np.uint64(1)] - factors[cell])
 
 
 @compiled
@@ -170,6 +200,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     r, vr, lxx, lxz, lzx, lzz, rho, exchange = s.ring, s.u, s.lxx, s.lxz, s.lzx, s.lzz, s.density, s.exchange
     phi_zero, compressive, tensile, phi_initial = own.zero_stress, own.compressive, own.tensile, s.initial
     sheared, strained = own.sheared, not plain and tables.of_strain.size > 0
+    laid, layered = s.laid, not plain and tables.of_depth.size > 0
     sxx, szz, sxz, pressure, sound = s.sxx, s.szz, s.sxz, s.pressure, s.sound
     work, exchanged, crushing, yield_square = s.work, s.exchanged, s.crushing, s.yield_square
     inverse_step = (sirono.TABLE_SIZE - 1) / sirono.TABLE_TOP / solid_density
@@ -193,6 +224,8 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
             strength *= parts.strengthen(-div, constants.rate)
         if strained:
             strength *= look_up_strain(tables.of_strain, sheared[i])
+        if layered:
+            strength *= look_up_depth(tables.of_depth, laid[i] * tables.per_depth)
         x = phi_zero[i]
         k = k0 * sirono.raise_to(x * (1.0 / 0.15), gamma, plain)
         trial = k * (phi / x - 1.0)
