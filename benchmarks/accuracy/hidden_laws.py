@@ -26,6 +26,7 @@ WHERE = {
     "force alike for all tips": DEPTH,
     "force on the rim": DEPTH,
     "strength of depth": SAMPLE,
+    "a camera that wobbles": CAMERA,
     "undisturbed dust": SAMPLE,
     "depth and speed and undisturbed dust": SAMPLE,
 }

@@ -154,7 +154,8 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
     if p_value < REJECTED and rivals:
         predicted = check_leading(problem, leading, np.random.default_rng(seed))
     # the laws without a name are those of drops
-    if not problem.pushed and needs_free_law(p_value, rivals, unknown.evidence, predicted):
+    explained = problem.pushed or unknown.find_wobble(nominal) is not None
+    if not explained and needs_free_law(p_value, rivals, unknown.evidence, predicted):
         unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal))
     verdict = judge(
         nominal,
@@ -277,7 +278,13 @@ def diagnose_campaign(
             f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not {lacks} "
             f"(p = {found.predicted:.2g}): something that is not listed may be at work"
         )
-    if found.verdict.word == "unknown":
+    wobble = found.unknown.find_wobble(nominal)
+    if found.verdict.word == "unknown" and wobble is not None:
+        warnings.append(
+            f"p_m is {math.exp(wobble.log_p_m):.4g} Pa, to {100 * wobble.log_p_m_sigma:.1f} %, with the camera's wobble taken "
+            "out; all other figures of p_m are without"
+        )
+    elif found.verdict.word == "unknown":
         warnings.append(
             f"p_m is not measured while the cause is unknown: {np.median(posterior.calibrated):.4g} Pa without, "
             f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"

@@ -413,4 +413,6 @@ def extended_model(found: Diagnosis) -> Model:
         for name in (found.best.hypothesis if found.verdict.word == "effect" else ())
     )
     fit = found.best if found.verdict.word == "effect" else found.nominal
-    return Model(p_m=math.exp(fit.log_p_m), effects=effects, matter=Path(found.campaign.material.law).stem)
+    wobble = found.unknown.find_wobble(found.nominal) if found.verdict.word == "unknown" else None
+    log_p_m = wobble.log_p_m if wobble is not None else fit.log_p_m
+    return Model(p_m=math.exp(log_p_m), effects=effects, matter=Path(found.campaign.material.law).stem)

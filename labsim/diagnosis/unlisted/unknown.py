@@ -2,9 +2,9 @@
 
 It competes with the causes on equal terms: residuals are a Gaussian process, orthogonal to nothing, whose size is
 integrated over a few values. What may deviate stands in FREEDOMS: a force law smooth over the way into the dust, speed and size;
-every drop by its own offset; the layering of undisturbed dust. Where the nominal model may fail, formulas that cost no runs
-compete too, together as one freedom; where it fails, laws that stand in the equations of motion (EMBEDDED, free_law.py): what
-these find is drawn as the shape of what is missing.
+every drop by its own offset; the layering of undisturbed dust. Where the nominal model may fail, a camera that wobbles competes
+too, and formulas that cost no runs, together as one freedom; where it fails, laws that stand in the equations of motion
+(EMBEDDED, free_law.py): what these find is drawn as the shape of what is missing.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from ...records import FloatArray
 from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
 from .free_law import SIZES as LAW_SIZES
 from .hats import fit_without_runs
+from .wobble import Wobble, fit_wobble
 
 SIZES = (0.01, 0.02, 0.04, 0.08)  # of the depth
 MAP_SHARE = 3.0  # a law that changes depths by 1 % may change the contrast of the map, or the undisturbed dust, by 3 %
 
 
-DUST = "undisturbed dust"
+DUST, WOBBLE = "undisturbed dust", "a camera that wobbles"
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class UnknownFit:
     """evidence : ln of the integrated likelihood; block, size : the best; law : (n,) posterior mean per datum of the drops, m.
 
     evidences : of every freedom, over its sizes; laws : what the data say of the laws of the best freedom that stands in the
-    equations, ``embedded``; empty where none was tried. tangents : of all hats, where embedded laws were tried.
+    equations, ``embedded``; empty where none was tried. tangents : of all hats, where embedded laws were tried. wobble : of the
+    camera, where the nominal model may fail.
     """
 
     evidence: float
@@ -65,6 +67,12 @@ class UnknownFit:
     embedded: str = ""
     laws: tuple[RecoveredLaw, ...] = ()
     tangents: Tangents | None = None
+    wobble: Wobble | None = None
+
+    def find_wobble(self, nominal: Fit) -> Wobble | None:
+        """The camera's wobble, where that alone explains the data."""
+        leads = self.block == WOBBLE and self.wobble is not None and self.wobble.explains(nominal)
+        return self.wobble if leads else None
 
 
 def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) -> UnknownFit:
@@ -104,6 +112,11 @@ def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) ->
         terms[list_terms()[term].title] = [each.evidence for each in formulas.values()]
         if best is None or found.evidence > best[0]:
             best = (found.evidence, list_terms()[term].title, 0.0, drops.residual - found.drops.residual)
+    wobble = fit_wobble(problem, fit) if fit_p_value(fit) < DOUBTFUL else None
+    if wobble is not None:
+        terms[WOBBLE] = wobble.evidences.tolist()
+        if best is None or wobble.evidences.max() > best[0]:
+            best = (float(wobble.evidences.max()), WOBBLE, 0.0, wobble.law)
     embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
     for name, places in EMBEDDED.items():
         if tangents is None:
@@ -127,7 +140,7 @@ def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) ->
     evidences = {name: log_mean(values) for name, values in terms.items()}
     nearest = max(embedded, key=lambda name: evidences[name], default="")
     laws = embedded.get(nearest, ())
-    return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, laws, tangents)
+    return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, laws, tangents, wobble)
 
 
 def log_mean(values: Collection[float]) -> float:

@@ -38,6 +38,12 @@ def say_missing(found: Diagnosis) -> str:
         return f"shows in {' and '.join(missed)} alone: p_m explains the drops"
     if found.learned is not None:
         return f"is like {say_formula(found.learned.best)}"
+    wobble = unknown.find_wobble(found.nominal)
+    if wobble is not None:
+        return (
+            f"looks like a camera that wobbles by {wobble.amplitude:.2g} ± {wobble.sigma:.1g} px at {wobble.frequency:.0f} Hz, "
+            "in flight and in the dust alike"
+        )
     if not is_embedded(found):
         return "looks like " + MISSING.get(unknown.block, unknown.block).format(
             size=f"{100 * unknown.size:.0f}"
@@ -64,7 +70,7 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
             f"{size} ± {error}",
             f"{'of the strength' if _is_strength(law) else 'on the tip'} {_say_place(law)}",
         )
-    if "depth" in MISSING[found.unknown.block]:
+    if "depth" in MISSING.get(found.unknown.block, ""):
         return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"
     return None
 
@@ -141,6 +147,20 @@ def describe_unknown(found: Diagnosis) -> dict[str, Any]:
             }
             for each in unknown.laws
         ],
+        "wobble": _describe_wobble(found),
+    }
+
+
+def _describe_wobble(found: Diagnosis) -> dict[str, Any] | None:
+    wobble = found.unknown.find_wobble(found.nominal)
+    if wobble is None:
+        return None
+    p_m = math.exp(wobble.log_p_m)
+    return {
+        "frequency_Hz": wobble.frequency,
+        "amplitude_px": wobble.amplitude,
+        "sd_px": wobble.sigma,
+        "p_m_Pa": {"mean": p_m, "sd": p_m * wobble.log_p_m_sigma},
     }
 
 
@@ -251,4 +271,5 @@ def _begin(words: str) -> str:
 
 
 def _show(law: RecoveredLaw, value: float) -> str:
-    return f"{law.law.place.factor * value:.1f}"
+    factor = law.law.place.factor
+    return f"{factor * value:.{max(1, _count_digits(factor * float(law.sigma.min())))}f}"
