@@ -18,7 +18,7 @@ import numpy as np
 from ...effects import Cauchy, Effect, Instrument, Normal, Parameter, Place
 from ...effects.contract import ChangeSetting
 from ...effects.law_places import LAW_PLACES, Knots, LawPlace
-from ...effects.terms import KNOTS, Term, add_term, list_terms, see_term
+from ...effects.terms import Term, add_term, list_terms, see_term
 from ...errors import ExtrapolationError
 from ...inference.fits.fitting import Fit, fit_hypothesis
 from ...inference.observations.compacted_zone import CompactedZones
@@ -180,7 +180,7 @@ def add_terms(
 
 def find_peak(term: Term, law: FreeLaw) -> float:
     """The largest value of a term's shape between what the data reach, which may lie between knots or before the last."""
-    return float(np.max(np.abs(shape_at(term, law, np.linspace(*law.reach, KNOTS)))))
+    return float(np.max(np.abs(shape_at(term, law, term.sample(*law.reach)))))
 
 
 def fit_without_runs(problem: Problem, nominal: Fit) -> dict[str, Fit]:

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...effects.terms import KNOTS, Term, list_terms
+from ...effects.terms import Term, list_terms
 from ...errors import LabsimError
 from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis, fit_p_value
 from ...inference.fits.refine import list_large_effects, refine
@@ -308,7 +308,7 @@ def share_places(terms: Mapping[str, Term]) -> dict[str, float]:
 
 def share_hats(term: Term, law: FreeLaw) -> FloatArray:
     """Heights of the law's hats whose sum is nearest to the term. Its values at the knots are not: a film between two is lost."""
-    places = np.linspace(law.grid[0], max(law.knots), KNOTS)
+    places = term.sample(law.grid[0], max(law.knots))
     hats = [np.interp(places, law.grid, [float(place == knot) for place in law.grid]) for knot in law.knots]
     heights: FloatArray = np.linalg.lstsq(np.stack(hats, axis=1), shape_at(term, law, places), rcond=None)[0]
     return heights

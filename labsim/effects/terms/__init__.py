@@ -20,7 +20,7 @@ from ..contract import Instrument, Place
 from ..law_places import LAW_PLACES, Knots, LawPlace
 
 FASTEST = 1.3  # of the impact speed, that a force of speed is tabulated to
-KNOTS = 97
+KNOTS, CLOSE = 97, 33
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,14 @@ class Term:
     def acts(self) -> LawPlace:
         return LAW_PLACES[self.place]
 
+    def sample(self, begin: float, end: float) -> FloatArray:
+        """Places from begin to end that show its shape; close to where it is large, if only there."""
+        places = np.linspace(begin, end, KNOTS)
+        if self.at is not None:
+            near = np.linspace(0.0, 2.0, CLOSE) * self.at
+            places = np.union1d(places, near[(near > begin) & (near < end)])
+        return places
+
     @property
     def limits(self) -> tuple[float, float]:
         """Of c: no force along the motion, for that gains energy on a closed way, no mass below nought, and no strength below
@@ -53,7 +61,7 @@ class Term:
             return least, self.acts.most
         if least == -math.inf:
             return -math.inf, math.inf
-        values = self.shape(np.append(np.linspace(0.0, self.acts.reach, KNOTS), self.at or 0.0))
+        values = self.shape(self.sample(0.0, self.acts.reach))
         highest, lowest = float(values.max()), float(values.min())
         return (least / highest if highest > 0 else -math.inf, least / lowest if lowest < 0 else math.inf)
 
@@ -102,7 +110,7 @@ def add_term(setting: DropSetting, term: Term, coefficient: float) -> DropSettin
     elif term.acts.over == "radius of the tip":
         radius = 1e3 * setting.projectile.tip_radius
         return add(setting, ((radius, coefficient * float(term.shape(np.array([radius]))[0])),))
-    place = np.linspace(0.0, end, KNOTS)
+    place = term.sample(0.0, end)
     value = coefficient * term.shape(place)
     return add(setting, tuple(zip((begin + place).tolist(), value.tolist(), strict=True)))
 

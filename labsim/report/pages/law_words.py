@@ -59,7 +59,7 @@ def comes_nearest(found: Diagnosis) -> bool:
 
 
 def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
-    """Value and unit for a tile: the clearest knot of an embedded law, or the share of the depth."""
+    """Value and unit for a tile: the clearest knot of an embedded law, the swing of a camera, or the share of the depth."""
     if is_embedded(found):
         law = _rank(found)[0]
         value, sigma = clearest(law)[1:]
@@ -69,6 +69,12 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
         return (
             f"{size} ± {error}",
             f"{'of the strength' if _is_strength(law) else 'on the tip'} {_say_place(law)}",
+        )
+    wobble = found.unknown.find_wobble(found.nominal)
+    if wobble is not None:
+        return (
+            f"{wobble.amplitude:.2g} ± {wobble.sigma:.1g} px",
+            f"of the camera, at {wobble.frequency:.0f} Hz",
         )
     if "depth" in MISSING.get(found.unknown.block, ""):
         return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"

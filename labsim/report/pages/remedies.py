@@ -33,7 +33,7 @@ def say_remedy(found: Diagnosis, suggestions: Sequence[Suggestion]) -> str:
                 "the next campaign try it by name."
             )
         if found.unknown.find_wobble(found.nominal) is not None:
-            return "Mount the camera apart from what shakes, or film a mark at rest beside the drop and take its motion off the rows."
+            return "Mount the camera apart from what shakes, or film a mark at rest too and take its motion off the rows."
         return "Look where the nominal fit misses the data, and make the experiment that is proposed next."
     said = []
     if len(found.verdict.named) > 1 and suggestions:
