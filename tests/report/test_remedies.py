@@ -12,11 +12,13 @@ from labsim.report.pages.remedies import BY_KIND, say_remedy
 EFFECTS = list_effects()
 
 
-def find(word, probabilities, value=1.06, learned=None, named=None, tests=()):
+def find(word, probabilities, value=1.06, learned=None, named=None, tests=(), wobble=None):
     posterior = SimpleNamespace(samples=lambda name: np.full(5, value))
     return SimpleNamespace(
         verdict=SimpleNamespace(word=word, probabilities=probabilities, named=named or probabilities[:1]),
         problem=SimpleNamespace(effects=EFFECTS),
+        nominal=None,
+        unknown=SimpleNamespace(find_wobble=lambda nominal: wobble),
         campaign=SimpleNamespace(strength_tests=tests),
         posterior_extended=posterior,
         learned=learned,
@@ -59,3 +61,4 @@ def test_none_and_unknown_have_one_too():
     assert say_remedy(find("none", [(("none",), 0.9)]), []) == "Nothing needs to be mended."
     assert "experiment" in say_remedy(find("unknown", [(("unknown",), 0.9)]), [])
     assert "model.toml" in say_remedy(find("unknown", [(("unknown",), 0.9)], learned=object()), [])
+    assert "camera" in say_remedy(find("unknown", [(("unknown",), 0.9)], wobble=object()), [])
