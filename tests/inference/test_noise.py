@@ -11,6 +11,7 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.inference.observations.observe import (
     ObservedDrop,
+    join_alike,
     judge_noise,
     observe_drop,
     read_observed_track,
@@ -68,3 +69,18 @@ def test_the_stated_noise_stands_where_no_row_says_otherwise(plain):
         for drop in plain
     ]
     assert compare(bare) == pytest.approx([1.0] * len(bare))
+
+
+def test_what_is_said_of_many_drops_is_said_once() -> None:
+    """Numbers from the least to the largest; what names frames, or is said of one drop, stands by itself."""
+    scatter = "rows scatter {} times their error bars about the fit; errors were raised"
+    said = [(f"D{k:02d}", scatter.format(3.5 + 0.25 * k)) for k in range(1, 10)]
+    said[3:3] = [("D04", "a gap before frame 12"), ("D05", "a gap before frame 14"), ("D06", "ratio = 0.7")]
+    assert join_alike(said) == [
+        "drops D01, D02, D03, D04, D05, D06 and 3 more: rows scatter 3.75 to 5.75 times their error bars about the fit; "
+        "errors were raised",
+        "drop D04: a gap before frame 12",
+        "drop D05: a gap before frame 14",
+        "drop D06: ratio = 0.7",
+    ]
+    assert join_alike([("D01", "p = 1e-5"), ("D02", "p = 1e-5")]) == ["drops D01, D02: p = 1e-5"]

@@ -7,9 +7,11 @@ which frames belong to the motion, and where the search for contact time and imp
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
+from itertools import chain, zip_longest
 
 import numpy as np
 
@@ -25,6 +27,9 @@ from .observe_push import ObservedPush, observe_push
 MARGIN = 4  # frames kept after the depth has stopped growing
 ASTRAY = 3.0  # times the scatter of the middle film, from which on a film says nothing of the others
 DUST_PARAMETERS = 3  # that the rows in the dust tell of a motion; contact and speed are those of free fall
+NUMBER = re.compile(r"(?:(?<=[\s(])-)?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+NAMES_FRAMES = re.compile(r"frames? \d")
+MOST_NAMED = 6  # drops of which the same is said
 # Warnings of a curve that say nothing to who compares drops: frames left out are counted, g is judged for all drops together.
 SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
 
@@ -188,10 +193,30 @@ def observe_drops(campaign: Campaign, *, workers: int | None = 1) -> tuple[list[
         raise failures[0][1]
     seen = judge_noise(seen)
     lines = [f"drop {name} left out: {error}" for name, error in failures]
-    lines += [
-        f"drop {drop.name}: {text}"
+    lines += join_alike(
+        (drop.name, text)
         for drop in seen
         for text in _list_warnings(drop)
         if not any(words in text for words in SAID_ELSEWHERE)
-    ]
+    )
     return seen, lines
+
+
+def join_alike(said: Iterable[tuple[str, str]]) -> list[str]:
+    """One line for all drops of which the same is said, numbers aside: these from the least to the largest.
+
+    said : name of a drop and a text. What names frames stays apart.
+    """
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for name, text in said:
+        words = f"{name} {text}" if NAMES_FRAMES.search(text) else NUMBER.sub("#", text)
+        alike.setdefault(words, []).append((name, text))
+    lines = []
+    for each in alike.values():
+        names, texts = zip(*each, strict=True)
+        columns = zip(*(NUMBER.findall(text) for text in texts), strict=True)
+        spans = [" to ".join(dict.fromkeys((min(c, key=float), max(c, key=float)))) for c in columns]
+        joined = "".join(chain(*zip_longest(NUMBER.split(texts[0]), spans, fillvalue="")))
+        further = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        lines.append(f"drop{'s' * (len(names) > 1)} {', '.join(names[:MOST_NAMED])}{further}: {joined}")
+    return lines
