@@ -18,7 +18,7 @@ from labsim.diagnosis.unlisted import free_law
 from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate, needs_free_law
 from labsim.diagnosis.unlisted.hats import FreeLaw, make_hats
 from labsim.diagnosis.unlisted.learned_law import learn_law
-from labsim.diagnosis.unlisted.unknown import FREEDOMS
+from labsim.diagnosis.unlisted.unknown import FREEDOMS, WOBBLE
 from labsim.effects import Place, list_effects
 from labsim.effects.law_places import LAW_PLACES, combine
 from labsim.effects.terms import list_terms
@@ -253,7 +253,7 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     without_runs = {term.title for term in list_terms().values() if term.acts.see}
     # one rod does not tell a depth in mm from one in tip radii
     untold = {name for name, place in LAW_PLACES.items() if place.over == "depth" and place.unit == "mm"}
-    assert set(unknown.evidences) - without_runs == {*FREEDOMS, *EMBEDDED} - untold - {
+    assert set(unknown.evidences) - without_runs == {*FREEDOMS, *EMBEDDED, WOBBLE} - untold - {
         name for name in FREEDOMS if "undisturbed dust" in FREEDOMS[name].kinds
     }
     assert unknown.embedded == "force of depth"
