@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from labsim.diagnosis.unlisted import learned_law
+from labsim.diagnosis.unlisted.free_law import Tangents
+from labsim.diagnosis.unlisted.hats import FreeLaw
+from labsim.effects.law_places import LAW_PLACES
 from labsim.effects.terms import list_terms
 from labsim.errors import ExtrapolationError
 
@@ -43,9 +47,9 @@ def search(monkeypatch):
     )
     units = {name: 1.0 for name, term in list_terms().items() if not term.acts.see}
 
-    def run(*names: str):
+    def run(*names: str, open_places: tuple[str, ...] = ()):
         fits = [make_fit(name) for name in names]
-        found = learned_law.fit_siblings(None, NOMINAL, fits, fits, units)
+        found = learned_law.fit_siblings(None, NOMINAL, fits, fits, units, open_places)
         return sorted(found, key=lambda fit: -fit.evidence), asked
 
     return run
@@ -74,3 +78,25 @@ def test_a_place_that_leads_nowhere_is_not_searched(search, monkeypatch) -> None
     monkeypatch.setitem(EVIDENCE, "stuck_mass", 79.0)
     _, asked = search("depth_root", "inertial_drag")
     assert "force of speed" not in {list_terms()[name].place for name, _ in asked}
+
+
+def test_forms_of_an_open_place_are_tried_though_the_data_are_explained(search) -> None:
+    """A place whose free law explains as much as the leading one's: the truth may be another form there."""
+    found, asked = search("depth_root", "stuck_mass", open_places=("force of depth", "force of speed"))
+    assert found[0].hypothesis == ("stuck_mass",)
+    # of the open ones those that a formula was fitted at
+    assert {list_terms()[name].place for name, _ in asked} == {"mass of depth", "force of depth"}
+
+
+def test_open_places_are_those_whose_free_law_explains_as_much() -> None:
+    """Hats of three places in made-up data: two explain a bump alike, the third does not."""
+    rng = np.random.default_rng(2)
+    shapes = rng.normal(size=(60, 2))
+    residual = 5.0 * shapes[:, 0] + rng.normal(size=60)
+    columns = [residual, shapes[:, 1], 3.0 * shapes[:, 0], 3.1 * shapes[:, 0], rng.normal(size=60)]
+    gram = np.stack(columns).dot(np.stack(columns).T)
+    knots = {"force of depth": (1.0,), "strength of depth": (0.5,), "force of speed": (0.3,)}
+    laws = tuple(FreeLaw(LAW_PLACES[name], at, at, (0.0, 2.0)) for name, at in knots.items())
+    names = ("ln_p_m", *(law.hat(0) for law in laws))
+    tangents = Tangents(laws, names, gram, 0.0, 60, np.zeros((60, 3)), 7.0)
+    assert set(learned_law.list_open_places(tangents, (4.0, 9.0))) == {"force of depth", "strength of depth"}

@@ -88,8 +88,8 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             dust = tuple(round(level + more, 6) for more in place.knots if level + more < most)
             laws.append(FreeLaw(place, dust, dust, (dust[0], dust[-1])))
         elif place.simulated and place.unit == "mm":
-            if place.over == "depth" and len(radii) == 1:
-                continue  # told from one that goes with tip radii by tips of two radii alone
+            if place.value_unit in ("mN", "N/m") and len(radii) == 1:
+                continue  # no other than a pressure, where all tips are alike
             depths = [float(f"{share * deepest_mm:.3g}") for share in place.knots]
             grid = tuple(depth for depth in depths if depth == 0.0 or depth >= thinnest)
             laws.append(FreeLaw(place, grid, grid, (0.0, deepest_mm)))

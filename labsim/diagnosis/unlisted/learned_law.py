@@ -8,7 +8,7 @@ fitted as any cause is. Formulas and figures: docs/learned-law.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -24,7 +24,7 @@ from ...records import FloatArray
 from ..explore import FACTORS, NOWHERE, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
-from .free_law import SIZES, Marginal, Tangents, integrate
+from .free_law import EMBEDDED, SIZES, Marginal, Tangents, choose_hats, integrate
 from .hats import FreeLaw, add_terms, shape_at
 from .unknown import log_mean
 
@@ -98,7 +98,8 @@ def learn_law(problem: Problem, nominal: Fit, tangents: Tangents, before: HeldOu
     weighed = weigh_formulas(tangents, terms, units, (low, high))
     chosen = [names for names, _ in choose_formulas(weighed, terms)]
     ranked = dict.fromkeys([names[0] for names, _ in weighed if len(names) == 1] + list(terms))
-    fits = fit_formulas(free, nominal, chosen, {name: units[name] for name in ranked})
+    open_places = list_open_places(tangents, (low, high))
+    fits = fit_formulas(free, nominal, chosen, {name: units[name] for name in ranked}, open_places)
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -122,9 +123,11 @@ def fit_formulas(
     nominal: Fit,
     chosen: Sequence[Hypothesis],
     units: Mapping[str, float],
+    open_places: Collection[str] = (),
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
-    them among runs about themselves. units : of all terms, those first that are weighed first."""
+    them among runs about themselves. units : of all terms, those first that are weighed first; open_places : whose forms are
+    tried in any case."""
     simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
     sparse: list[Fit] = []
     for names in chosen:
@@ -141,7 +144,7 @@ def fit_formulas(
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    return fit_siblings(problem, nominal, fits, sparse, units)
+    return fit_siblings(problem, nominal, fits, sparse, units, open_places)
 
 
 def fit_anew(
@@ -188,13 +191,14 @@ def fit_siblings(
     fits: Sequence[Fit],
     sparse: Sequence[Fit],
     units: Mapping[str, float],
+    open_places: Collection[str] = (),
 ) -> list[Fit]:
     """The fits, and the other terms of their places, begun where the best formula with a term there ended and as large: which
     form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as ``units`` has them in order.
 
-    Places of the best formula and of those hardly told from it; until something explains the data all places that few runs
-    (``sparse``) lead to, one after another, the dear ones last. The best, in the end MOST_REFINED of them, have runs about
-    themselves.
+    Places of the best formula, of those hardly told from it, and ``open_places``; until something explains the data all places
+    that few runs (``sparse``) lead to, one after another, the dear ones last. The best, in the end MOST_REFINED of them, have
+    runs about themselves.
     """
     found, seen, refined = list(fits), set[str](), set[Hypothesis]()
     while True:
@@ -202,6 +206,9 @@ def fit_siblings(
             found = _refine_leading(problem, found, 1, refined)
         explained = _explains(found)
         begun = _list_places(found, () if explained else sparse, units, ALIKE if explained else NOWHERE)
+        if explained:
+            further = _list_places(sparse, (), units, math.inf)
+            begun = begun | {place: further[place] for place in open_places if place in {*further} - {*begun}}
         place = next((each for each in begun if each not in seen), None)
         if place is None:
             return _refine_leading(problem, found, MOST_REFINED, refined)
@@ -224,6 +231,19 @@ def fit_siblings(
                     again = fit_from_strengths(problem, nominal, (name,), top)
                     siblings += [again] if again is not None else []
         found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
+
+
+def list_open_places(tangents: Tangents, limits: tuple[float, float]) -> list[str]:
+    """Places whose law, left free, explains about as much as that of the best place does: what stands there is a matter of its
+    form, which is then tried."""
+    evidence = {}
+    for name, places in EMBEDDED.items():
+        hats = choose_hats(tangents, name)
+        if hats and len(places) == 1:
+            each = [integrate(tangents, hats, size, limits).evidence for size in SIZES]
+            evidence[places[0]] = log_mean(each)
+    top = max(evidence.values(), default=0.0)
+    return sorted((place for place in evidence if evidence[place] > top - ALIKE), key=lambda p: -evidence[p])
 
 
 def _explains(fits: Sequence[Fit]) -> bool:
