@@ -305,9 +305,9 @@ def diagnose_campaign(
     )
     about = best if found.verdict.word == "effect" else nominal
     untestable = list_untestable(problem, about)
-    learned, tangents = None, found.unknown.tangents
-    if found.verdict.word == "unknown" and tangents is not None:
-        learned = learn_law(problem, nominal, tangents, held_nominal)
+    learned = None
+    if found.verdict.word == "unknown":
+        learned = learn_law(problem, nominal, found.unknown, held_nominal)
     doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]

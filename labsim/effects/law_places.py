@@ -22,17 +22,8 @@ from .contract import Instrument
 Knots = tuple[tuple[float, float], ...]
 MOST_DELAY = 0.6  # s/m: a tip of 1 m/s must not outrun the rows
 LEAST = 0.1  # of the strength that p_m gives, which a law must leave
-IN_MM = (
-    0.0,
-    0.04,
-    0.063,
-    0.1,
-    0.16,
-    0.25,
-    0.4,
-    0.63,
-    1.0,
-)  # of the deepest drop: a layer is felt by its share of the way
+# of the deepest drop: a layer is felt by its share of the way
+IN_MM = (0.0, 0.04, 0.063, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0)
 
 
 @dataclass(frozen=True)

@@ -268,7 +268,7 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     assert not any(name in found.problem.effects for law in LAWS for name in law.hats)
     # what is learned in its place: a force of depth with its peak in the film, by which held-out drops are predicted
     assert unknown.tangents is not None
-    learned = learn_law(problem, found.nominal, unknown.tangents, predict_held_out(problem, found.nominal))
+    learned = learn_law(problem, found.nominal, unknown, predict_held_out(problem, found.nominal))
     assert learned is not None
     best = learned.best
     # six drops of one rod do not tell a film that pushes from a layer that is stronger (docs/learned-law.md)

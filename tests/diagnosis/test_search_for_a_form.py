@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from labsim.diagnosis.unlisted import learned_law
-from labsim.diagnosis.unlisted.free_law import Tangents
+from labsim.diagnosis.unlisted.free_law import SIZES, Tangents, integrate
 from labsim.diagnosis.unlisted.hats import FreeLaw
+from labsim.diagnosis.unlisted.unknown import UnknownFit, log_mean
 from labsim.effects.law_places import LAW_PLACES
 from labsim.effects.terms import list_terms
 from labsim.errors import ExtrapolationError
@@ -99,4 +100,9 @@ def test_open_places_are_those_whose_free_law_explains_as_much() -> None:
     laws = tuple(FreeLaw(LAW_PLACES[name], at, at, (0.0, 2.0)) for name, at in knots.items())
     names = ("ln_p_m", *(law.hat(0) for law in laws))
     tangents = Tangents(laws, names, gram, 0.0, 60, np.zeros((60, 3)), 7.0)
-    assert set(learned_law.list_open_places(tangents, (4.0, 9.0))) == {"force of depth", "strength of depth"}
+    evidences = {
+        law.name: log_mean([integrate(tangents, law.hats, size, (4.0, 9.0)).evidence for size in SIZES])
+        for law in laws
+    }
+    unknown = UnknownFit(0.0, "", 0.0, np.zeros(1), evidences)
+    assert set(learned_law.list_open_places(unknown)) == {"force of depth", "strength of depth"}

@@ -79,19 +79,17 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             deepest = max([deepest, *(each.map.tip_depth / each.radius for each in observed)])
             deepest_mm = max([deepest_mm, *(1e3 * each.map.tip_depth for each in observed)])
             fastest = max(fastest, math.exp(float(nuisances.max())))
-    radii = {group.projectile.tip_radius for group in problem.groups}
-    thinnest = THIN * 1e3 * min(radii)
-    laws = []
+    radii, laws = _list_radii(problem), []
     for place in LAW_PLACES.values():
         if place.over == "filling factor":
             level, most = problem.campaign.sample.filling_factor, problem.campaign.material.phi_2
             dust = tuple(round(level + more, 6) for more in place.knots if level + more < most)
             laws.append(FreeLaw(place, dust, dust, (dust[0], dust[-1])))
         elif place.simulated and place.unit == "mm":
-            if place.value_unit in ("mN", "N/m") and len(radii) == 1:
+            if place.value_unit in ("mN", "N/m") and radii.size == 1:
                 continue  # no other than a pressure, where all tips are alike
             depths = [float(f"{share * deepest_mm:.3g}") for share in place.knots]
-            grid = tuple(depth for depth in depths if depth == 0.0 or depth >= thinnest)
+            grid = tuple(depth for depth in depths if depth == 0.0 or depth >= THIN * radii[0])
             laws.append(FreeLaw(place, grid, grid, (0.0, deepest_mm)))
         elif place.simulated:
             most = {"tip radii": deepest, "m/s": fastest}.get(place.unit, place.reach)
@@ -100,6 +98,11 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             reached = _reached(place.knots, most)[int(place.least > -math.inf) :]
             laws.append(FreeLaw(place, place.knots, reached, (0.0, most)))
     return tuple(laws)
+
+
+def _list_radii(problem: Problem) -> FloatArray:
+    """Of all tips, mm, rising."""
+    return np.unique([1e3 * group.projectile.tip_radius for group in problem.groups])
 
 
 def _reached(knots: Sequence[float], most: float) -> tuple[float, ...]:
@@ -156,17 +159,16 @@ def add_terms(
     the data do not reach.
     """
     places = {law.name: law for law in laws if law.knots}
-    radii = np.unique([1e3 * group.projectile.tip_radius for group in problem.groups])
-    thinnest = THIN * float(radii.min())
+    radii = _list_radii(problem)
     terms, units = {}, {}
     for name, term in list_terms().items():
         if name in problem.effects:
             continue
         if term.place in places:
             largest = find_peak(term, places[term.place])
-            if term.at is not None and not thinnest <= term.at <= places[term.place].reach[1]:
+            if term.at is not None and not THIN * radii[0] <= term.at <= places[term.place].reach[1]:
                 continue
-        elif term.acts.over == "radius of the tip" and len(radii) > 1:
+        elif term.acts.over == "radius of the tip" and radii.size > 1:
             largest = 0.5 * float(np.ptp(term.shape(radii)))  # what all tips have in common is p_m
         elif term.acts.see and any(isinstance(model, DropModel) for model in problem.tracks.models):
             largest = 1.0

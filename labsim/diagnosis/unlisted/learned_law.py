@@ -24,9 +24,9 @@ from ...records import FloatArray
 from ..explore import FACTORS, NOWHERE, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
-from .free_law import EMBEDDED, SIZES, Marginal, Tangents, choose_hats, integrate
+from .free_law import EMBEDDED, SIZES, Marginal, Tangents, integrate
 from .hats import FreeLaw, add_terms, shape_at
-from .unknown import log_mean
+from .unknown import UnknownFit, log_mean
 
 MOST_WEIGHED = 4  # formulas that few runs are made of, beside the best of every place
 MOST_SIMULATED = (
@@ -86,20 +86,24 @@ class LearnedLaw:
         return [each for each in self.formulas[1:] if each.fit.evidence > self.best.fit.evidence - ALIKE]
 
 
-def learn_law(problem: Problem, nominal: Fit, tangents: Tangents, before: HeldOut) -> LearnedLaw | None:
+def learn_law(problem: Problem, nominal: Fit, unknown: UnknownFit, before: HeldOut) -> LearnedLaw | None:
     """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
-    and gives held-out drops a higher probability, the best of them where its fit is repeated without them too.
+    and gives held-out drops a higher probability, the best of them where its fit is repeated without them too; None where no law
+    was left free.
 
     before : the nominal model's predictions of held-out drops.
     """
+    tangents = unknown.tangents
+    if tangents is None:
+        return None
     free, terms, units = add_terms(problem, tangents.laws)
     free = replace(free, shape_evidence={**free.shape_evidence, **share_places(terms)})
     low, high = (math.log(p) for p in problem.campaign.p_m_range)
     weighed = weigh_formulas(tangents, terms, units, (low, high))
     chosen = [names for names, _ in choose_formulas(weighed, terms)]
     ranked = dict.fromkeys([names[0] for names, _ in weighed if len(names) == 1] + list(terms))
-    open_places = list_open_places(tangents, (low, high))
-    fits = fit_formulas(free, nominal, chosen, {name: units[name] for name in ranked}, open_places)
+    ordered = {name: units[name] for name in ranked}
+    fits = fit_formulas(free, nominal, chosen, ordered, list_open_places(unknown))
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -208,7 +212,9 @@ def fit_siblings(
         begun = _list_places(found, () if explained else sparse, units, ALIKE if explained else NOWHERE)
         if explained:
             further = _list_places(sparse, (), units, math.inf)
-            begun = begun | {place: further[place] for place in open_places if place in {*further} - {*begun}}
+            begun |= {
+                place: further[place] for place in open_places if place in further and place not in begun
+            }
         place = next((each for each in begun if each not in seen), None)
         if place is None:
             return _refine_leading(problem, found, MOST_REFINED, refined)
@@ -223,9 +229,8 @@ def fit_siblings(
                 siblings.append(
                     fit_hypothesis(problem, (name,), begin, sparse=place not in PEAKED, nuisances=start)
                 )
-            if (
-                place not in PEAKED and not explained
-            ):  # where the wrong form led, the right one's runs may fail
+            # where the wrong form led, the right one's runs may fail
+            if place not in PEAKED and not explained:
                 top = max([nominal.evidence, *(fit.evidence for fit in siblings)])
                 with suppress(LabsimError):
                     again = fit_from_strengths(problem, nominal, (name,), top)
@@ -233,17 +238,16 @@ def fit_siblings(
         found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
 
 
-def list_open_places(tangents: Tangents, limits: tuple[float, float]) -> list[str]:
+def list_open_places(unknown: UnknownFit) -> list[str]:
     """Places whose law, left free, explains about as much as that of the best place does: what stands there is a matter of its
     form, which is then tried."""
-    evidence = {}
-    for name, places in EMBEDDED.items():
-        hats = choose_hats(tangents, name)
-        if hats and len(places) == 1:
-            each = [integrate(tangents, hats, size, limits).evidence for size in SIZES]
-            evidence[places[0]] = log_mean(each)
-    top = max(evidence.values(), default=0.0)
-    return sorted((place for place in evidence if evidence[place] > top - ALIKE), key=lambda p: -evidence[p])
+    alone = {
+        places[0]: unknown.evidences.get(name, -math.inf)
+        for name, places in EMBEDDED.items()
+        if len(places) == 1
+    }
+    ranked = sorted(alone, key=lambda place: -alone[place])
+    return [place for place in ranked if alone[place] > alone[ranked[0]] - ALIKE]
 
 
 def _explains(fits: Sequence[Fit]) -> bool:

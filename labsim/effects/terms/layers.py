@@ -1,6 +1,6 @@
 """Layers of the sample: dust that is stronger or weaker at a depth in mm, whatever the tip.
 
-Depths are the preferred numbers of ISO 3, from 0.1 to 100 mm; those that a campaign's drops reach are tried.
+Depths are the preferred numbers of ISO 3, from 0.1 to 80 mm; those that a campaign's drops reach are tried.
 """
 
 from collections.abc import Callable

@@ -11,6 +11,7 @@ from ...diagnosis.campaign import Diagnosis
 from ...diagnosis.judge import PREDICTED
 from ...diagnosis.unlisted.free_law import EMBEDDED, RecoveredLaw
 from ...diagnosis.unlisted.learned_law import Formula
+from ...diagnosis.unlisted.wobble import Wobble
 from .page import show_number
 
 MISSING = {
@@ -41,8 +42,8 @@ def say_missing(found: Diagnosis) -> str:
     wobble = unknown.find_wobble(found.nominal)
     if wobble is not None:
         return (
-            f"looks like a camera that wobbles by {wobble.amplitude:.2g} ± {wobble.sigma:.1g} px at {wobble.frequency:.0f} Hz, "
-            "in flight and in the dust alike"
+            f"looks like a camera that wobbles by {_say_swing(wobble)} at {wobble.frequency:.0f} Hz, in flight and in the dust "
+            "alike"
         )
     if not is_embedded(found):
         return "looks like " + MISSING.get(unknown.block, unknown.block).format(
@@ -62,20 +63,14 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
     """Value and unit for a tile: the clearest knot of an embedded law, the swing of a camera, or the share of the depth."""
     if is_embedded(found):
         law = _rank(found)[0]
-        value, sigma = clearest(law)[1:]
-        place = law.law.place
-        size = show_number(place.factor * value, f"{{:+.{_count_digits(place.factor * sigma)}f}}")
-        error = f"{place.factor * sigma:.{_count_digits(place.factor * sigma)}f} {place.shown_unit}"
+        _, value, sigma = clearest(law)
         return (
-            f"{size} ± {error}",
+            _say_size(law, value, sigma, "+"),
             f"{'of the strength' if _is_strength(law) else 'on the tip'} {_say_place(law)}",
         )
     wobble = found.unknown.find_wobble(found.nominal)
     if wobble is not None:
-        return (
-            f"{wobble.amplitude:.2g} ± {wobble.sigma:.1g} px",
-            f"of the camera, at {wobble.frequency:.0f} Hz",
-        )
+        return _say_swing(wobble), f"of the camera, at {wobble.frequency:.0f} Hz"
     if "depth" in MISSING.get(found.unknown.block, ""):
         return f"≈ {100 * found.unknown.size:.0f} %", "of the depth"
     return None
@@ -84,14 +79,20 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
 def say_law(law: RecoveredLaw) -> str:
     """Its clearest knot: a strength 12 ± 3 % higher than p_m gives at a filling factor of 0.18."""
     _, value, sigma = clearest(law)
-    place = law.law.place
-    digits = _count_digits(place.factor * sigma)
-    size = f"{place.factor * abs(value):.{digits}f} ± {place.factor * sigma:.{digits}f} {place.shown_unit}"
+    size = _say_size(law, abs(value), sigma)
     if _is_strength(law):
         return f"{size} {'more' if value > 0 else 'less'} compressive strength {_say_place(law)}"
     towards = {"depth": ("upwards", "downwards"), "speed": ("against the motion", "along the motion")}
     word = towards[law.law.over][value < 0]
-    return f"a force on the tip of {size}{PER[place.value_unit]} {word} {_say_place(law)}"
+    return f"a force on the tip of {size}{PER[law.law.place.value_unit]} {word} {_say_place(law)}"
+
+
+def _say_size(law: RecoveredLaw, value: float, sigma: float, sign: str = "") -> str:
+    """value ± sigma as they are shown, with the unit."""
+    place = law.law.place
+    digits = _count_digits(place.factor * sigma)
+    size = show_number(place.factor * value, f"{{:{sign}.{digits}f}}")
+    return f"{size} ± {place.factor * sigma:.{digits}f} {place.shown_unit}"
 
 
 def _is_strength(law: RecoveredLaw) -> bool:
@@ -155,6 +156,10 @@ def describe_unknown(found: Diagnosis) -> dict[str, Any]:
         ],
         "wobble": _describe_wobble(found),
     }
+
+
+def _say_swing(wobble: Wobble) -> str:
+    return f"{wobble.amplitude:.2g} ± {wobble.sigma:.1g} px"
 
 
 def _describe_wobble(found: Diagnosis) -> dict[str, Any] | None:
