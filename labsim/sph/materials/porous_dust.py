@@ -49,6 +49,7 @@ TERMS = tuple(parts.TERMS)  # of a setting that it takes: all
 
 LAYERS_PER_SPACING = 20  # entries of the table of what goes with the depth
 STRAIN_TOP, STRAIN_SIZE = 4.0, 401  # of the table of what goes with the plastic strain; beyond it is constant
+PER_STRAIN = (STRAIN_SIZE - 1) / STRAIN_TOP
 
 sound_speed = parts.sound_speed
 
@@ -171,16 +172,8 @@ def _tabulate_layers(setting: DropSetting) -> tuple[FloatArray, float]:
 
 
 @compiled
-def look_up_strain(factors, strain):
-    """A factor at a plastic strain."""
-    position = min(strain * ((STRAIN_SIZE - 1) / STRAIN_TOP), STRAIN_SIZE - 1.001)
-    cell = np.uint64(position)
-    return factors[cell] + (position - cell) * (factors[cell + np.uint64(1)] - factors[cell])
-
-
-@compiled
-def look_up_depth(factors, position):
-    """A factor at a place in the table, counted in entries."""
+def interpolate(factors, position):
+    """A factor at a place in its table, counted in entries; beyond the ends it is constant."""
     place = min(max(position, 0.0), factors.size - 1.001)
     cell = np.uint64(place)
     return factors[cell] + (place - cell) * (factors[cell + np.uint64(1)] - factors[cell])
@@ -223,9 +216,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         if not plain and div < 0.0:
             strength *= parts.strengthen(-div, constants.rate)
         if strained:
-            strength *= look_up_strain(tables.of_strain, sheared[i])
+            strength *= interpolate(tables.of_strain, sheared[i] * PER_STRAIN)
         if layered:
-            strength *= look_up_depth(tables.of_depth, laid[i] * tables.per_depth)
+            strength *= interpolate(tables.of_depth, laid[i] * tables.per_depth)
         x = phi_zero[i]
         k = k0 * sirono.raise_to(x * (1.0 / 0.15), gamma, plain)
         trial = k * (phi / x - 1.0)
@@ -243,7 +236,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
         a, c, b = parts.shear_elastically(dt, shear, exx, ezz, exz, spin, sxx_old, szz_old, sxz_old)
         limit2 = shear_factor * shear_factor * strength * tension
         if strained:
-            limit2 *= look_up_strain(tables.shear_of_strain, sheared[i]) ** 2
+            limit2 *= interpolate(tables.shear_of_strain, sheared[i] * PER_STRAIN) ** 2
             beyond = math.sqrt(parts.measure_shear(a, c, b)) - math.sqrt(limit2)
             sheared[i] += max(beyond, 0.0) / (3.0 * shear)
         a, c, b = parts.return_radially(a, c, b, limit2)
