@@ -160,7 +160,7 @@ def _evidence(
 def _take_name(problem: Problem, variant: str, base: str) -> None:
     problem.effects[base] = problem.effects[variant]
     for each in problem.features:
-        for kept in (each.table.changes, each.table.fingerprints):
+        for kept in each.table.kinds:
             kept.pop(base, None)
             if variant in kept:
                 kept[base] = kept.pop(variant)

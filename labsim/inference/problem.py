@@ -14,6 +14,7 @@ from ..effects import Effect, Instrument, Place
 from ..effects.model import Model, make_instrument
 from ..records import Campaign, FloatArray
 from ..sph import DropSetting
+from .emulation.deflection import acts_on_projectile
 from .emulation.forward import ResponseTable
 from .emulation.grid import Change, ProjectileGroup, Request, RunGrid, RunKey
 from .emulation.nodes import amplitude_nodes, enclosing_nodes, screening_node
@@ -151,10 +152,13 @@ class Problem:
         if request.of(number) in self._filled:
             return
         self._filled.add(request.of(number))
-        before, after = self._extract_plain(number, request.plain), self._extract(number, request)
+        integrated = request.of(number) in self.grid.integrated
+        plain = Request("", None, request.index) if integrated else request.plain
+        before, after = self._extract_plain(number, plain), self._extract(number, request)
         spacings = self.groups[number].spacings  # a change is one from the run of the same spacing
         for (table, features), (_, features_before) in zip(after, before, strict=True):
             kept = table.fingerprints if request.sparse else table.changes
+            kept = table.integrated if integrated else kept
             entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
             if features is not None and features_before is not None:
@@ -185,6 +189,14 @@ class Problem:
         changed = effect.apply(setting, {parameter.name: parameter.hold(parameter.step)}, place)
         back = changed.replace(material=set_value(changed.material, read_value(setting.material)))
         return back == setting
+
+    def acts_on_projectile(self, name: str) -> bool:
+        """Whether an effect changes nothing of a drop but what acts on the projectile alone."""
+        effect, setting = self._find(name), self.state(self.groups[0])
+        amplitude = effect.amplitudes[0].step if effect.amplitudes else 0.0
+        return effect.change_setting is not None and acts_on_projectile(
+            setting, self.change(name, amplitude)(setting)
+        )
 
     def at(self, name: str, amplitude: float) -> dict[str, float]:
         """Values of an effect's parameters at an amplitude, kept inside the limits."""
@@ -221,17 +233,26 @@ class Problem:
         self.require_base(enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step))
 
     def require_changes(
-        self, wanted: Sequence[tuple[str, float, float]], text: str = "effects", *, sparse: bool = False
+        self,
+        wanted: Sequence[tuple[str, float, float]],
+        text: str = "effects",
+        *,
+        sparse: bool = False,
+        integrated: bool = False,
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect; at few
-        speeds they are fingerprints."""
+        speeds they are fingerprints. Of these, or where ``integrated``, laws on the projectile alone take no runs."""
         if sparse:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
+        names = {name for name, _, _ in wanted} if sparse or integrated else set()
+        laws = {name for name in names if self.acts_on_projectile(name)}
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, sparse) for name, a, index in wanted
+            Request(self._variant(name, a), self.change(name, a), index, sparse, name in laws)
+            for name, a, index in wanted
         ]
         plain = sorted({request.plain for request in changed}, key=lambda request: request.index)
+        plain += [Request("", None, request.index) for request in changed if request.integrated]
         self.grid.require([*plain, *changed], text)
         for number in range(len(self.groups)):
             for (name, amplitude, _), request in zip(wanted, changed, strict=True):
@@ -253,7 +274,10 @@ class Problem:
 
     def _has_fingerprint(self, name: str, index: float) -> bool:
         """Whether every projectile has a run at a strength node by which an effect is known there."""
-        return all(each.table.fingerprints.get(name, {}).get(index) for each in self.features)
+        return all(
+            any(kept.get(name, {}).get(index) for kept in (each.table.integrated, each.table.fingerprints))
+            for each in self.features
+        )
 
     def initial_setting(self, amplitudes: Mapping[str, float], name: str) -> DropSetting:
         """What would be simulated at the place of a drop or scan, for data that need no run: its initial state counts.

@@ -134,7 +134,8 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     budget = replace(problem.budget, numerical_change=ONE_AMPLITUDE)
     free = replace(problem, effects={**problem.effects, **hats}, budget=budget)
     # at every speed: what a force at some depth changes has a peak where drops end there
-    free.require_changes([(name, hat.amplitudes[0].step, index) for name, hat in hats.items()], "free law")
+    nodes = [(name, hat.amplitudes[0].step, index) for name, hat in hats.items()]
+    free.require_changes(nodes, "free law", integrated=True)
     names = [name for name in hats if has_runs(problem, name)]
     scales = {hat: law.scale for law in laws for hat in law.hats}
     free, formulas, units = add_terms(free)
@@ -174,7 +175,7 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
         }
         bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
         nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], sparse=True)]
-        free.require_changes(nodes, "free law, large")
+        free.require_changes(nodes, "free law, large", integrated=True)
         nuisances, _ = move_nuisances(problem, nuisances, blocks, weighted)
     return found
 

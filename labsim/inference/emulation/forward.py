@@ -29,13 +29,15 @@ Changes = dict[float, dict[float, FloatArray]]
 class ResponseTable:
     """Features of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds.
-    fingerprints : the same at the few speeds, taken where there are no changes. parameters : of effects whose amplitudes
-    have a grade of their own. absent : effects that are not at work in what the table stands for."""
+    integrated : the same of laws on the projectile, from the nominal runs (deflection.py), taken where there are no changes;
+    fingerprints : at the few speeds, taken where there are neither. parameters : of effects whose amplitudes have a grade of
+    their own. absent : effects that are not at work in what the table stands for."""
 
     log_speeds: FloatArray
     sparse: tuple[int, ...]
     base: dict[float, FloatArray] = field(default_factory=dict)
     changes: dict[str, Changes] = field(default_factory=dict)
+    integrated: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
     absent: frozenset[str] = frozenset()
@@ -60,7 +62,12 @@ class ResponseTable:
 
     def knows(self, name: str) -> bool:
         """Whether some run says what an effect changes, fingerprints where there are no others."""
-        return any((self.changes.get(name) or self.fingerprints.get(name, {})).values())
+        return any(next((kept[name] for kept in self.kinds if kept.get(name)), {}).values())
+
+    @property
+    def kinds(self) -> tuple[dict[str, Changes], ...]:
+        """What effects change, the kind that is taken first in front."""
+        return self.changes, self.integrated, self.fingerprints
 
     def grade(self, name: str, amplitude: float) -> float:
         """Where an amplitude of an effect lies on the scale on which features are interpolated."""
@@ -90,18 +97,18 @@ class Response:
         """The features (m,) with effects; that of ``plain`` itself where none of them has runs in the table."""
         features = self.plain
         for name, amplitude in amplitudes.items():
-            known = name in self.table.changes or name in self.table.fingerprints
+            known = any(name in kept for kept in self.table.kinds)
             if amplitude != 0.0 and known and name not in self.table.absent:
                 features = features + self.change(name, amplitude)
         return features
 
     def change(self, name: str, amplitude: float) -> FloatArray:
         """What an effect adds to the features, (m,)."""
-        if name in self.table.changes:
-            runs, across = self.table.changes[name], self.across
-        else:
+        kept = next(kept for kept in self.table.kinds if name in kept)
+        runs, across = kept[name], self.across
+        if kept is self.table.fingerprints:
             sparse = self.table.log_speeds[list(self.table.sparse)]
-            runs, across = self.table.fingerprints[name], interpolation_weights(sparse, self.log_speed)
+            across = interpolation_weights(sparse, self.log_speed)
         indices = [index for index in runs if runs[index]]
         if not indices:
             raise ExtrapolationError("simulation", name, "every run with it failed; see labsim runs")

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -20,8 +21,9 @@ from ...records import Motion as Led
 from ...runs.parts import AnyPart, Compaction, Motion, Part, Push
 from ...runs.run_file import FailedRun
 from ...runs.store import Progress, RunStore
-from ...sph import DropSetting
+from ...sph import DropRun, DropSetting
 from ...sph.materials import find_law
+from .deflection import acts_on_projectile, deflect
 
 SPEED_ANCHOR, SPEED_RATIO = 0.1, 1.55  # m/s
 STRENGTH_ANCHOR, STRENGTH_RATIO = 1000.0, 2.0  # Pa
@@ -88,18 +90,20 @@ class ProjectileGroup:
 class Request:
     """Runs of all groups at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    sparse : of fingerprints, at few speeds and with wider spacings.
+    sparse : of fingerprints, at few speeds and with wider spacings. integrated : what acts on the projectile alone is taken from
+    the nominal model's runs (deflection.py), at all speeds, as far as they know it.
     """
 
     variant: str
     change: Change | None
     index: float
     sparse: bool = False
+    integrated: bool = False
 
     @property
     def plain(self) -> Request:
         """The same runs of the nominal model."""
-        return replace(self, variant="", change=None)
+        return replace(self, variant="", change=None, integrated=False)
 
     def of(self, number: int) -> RunKey:
         """Under what the runs of one group are kept."""
@@ -265,6 +269,7 @@ class RunGrid:
     progress: Progress | None = None
     extension: Change | None = None  # of the nominal model, by a model.toml
     runs: dict[RunKey, list[AnyPart | FailedRun]] = field(default_factory=dict)
+    integrated: set[RunKey] = field(default_factory=set)  # of these, those that are no simulations
 
     def setting(self, group: ProjectileGroup, speed: float, p_m: float, sparse: bool = False) -> DropSetting:
         """The nominal model of the campaign for one node."""
@@ -289,25 +294,78 @@ class RunGrid:
             for number in range(len(self.groups))
             if request.of(number) not in self.runs
         ]
-        settings, places = [], []
+        # the nominal model first: laws rest on its runs
+        self._simulate([each for each in missing if not each[0].integrated], text)
+        self._simulate(self._integrate([each for each in missing if each[0].integrated], text), text)
+
+    def _simulate(self, wanted: Sequence[tuple[Request, int]], text: str) -> None:
+        """Run requests of groups."""
+        settings: list[DropSetting] = []
         parts: list[Part] = []
-        for request, number in missing:
+        places = []
+        for request, number in wanted:
             group = self.groups[number]
-            changed = request.variant != ""
-            positions = group.sparse if request.sparse else range(len(group.speeds))
-            laid = [(k, factor) for k in positions for factor in group.spacings(request.sparse, k, changed)]
-            for position, factor in laid:
-                setting = self.setting(
-                    group, group.speeds[position], strength_node(request.index), request.sparse
-                )
-                setting = request.change(setting) if request.change is not None else setting
-                setting = setting.replace(spacing=factor * setting.spacing)
-                settings.append(hasten(setting) if group.pushed else setting)
-                parts.append(Push if group.pushed else Compaction if group.is_scan else Motion)
-            places.append((request, number, len(laid)))
+            asked = self._list_settings(request, number)
+            settings += [hasten(setting) for setting in asked] if group.pushed else asked
+            parts += [Push if group.pushed else Compaction if group.is_scan else Motion] * len(asked)
+            places.append((request, number, len(asked)))
+        runs = iter(self._get_parts(settings, parts, text))
+        for request, number, count in places:
+            self.runs[request.of(number)] = list(islice(runs, count))
+
+    def _integrate(self, wanted: Sequence[tuple[Request, int]], text: str) -> list[tuple[Request, int]]:
+        """Motions of films with laws on the projectile, from the nominal model's runs; what has to be simulated after all is
+        returned: other groups, other laws."""
+        rest: list[tuple[Request, int]] = []
+        laws: dict[tuple[int, float], list[tuple[Request, list[DropSetting]]]] = {}
+        for request, number in wanted:
+            plain = self._list_films(request, number)
+            settings = self._list_settings(replace(request, sparse=False), number) if plain else []
+            if plain and all(map(acts_on_projectile, (run.setting for run in plain), settings)):
+                laws.setdefault((number, request.index), []).append((request, settings))
+            else:
+                rest.append((request, number))
+        for (number, _), asked in laws.items():
+            found = deflect(self._list_films(asked[0][0], number), [settings for _, settings in asked])
+            beyond = [
+                setting
+                for (_, settings), motions in zip(asked, found, strict=True)
+                for setting, motion in zip(settings, motions, strict=True)
+                if motion is None
+            ]
+            runs = iter(self._get_parts(beyond, [Motion] * len(beyond), text))
+            for (request, _), motions in zip(asked, found, strict=True):
+                key = request.of(number)
+                self.runs[key] = [next(runs) if motion is None else motion for motion in motions]
+                self.integrated.add(key)
+        return rest
+
+    def _list_films(self, request: Request, number: int) -> list[Motion | DropRun]:
+        """The nominal model's runs at a request's strength, if the group is filmed drops alone and all of them stopped."""
+        group = self.groups[number]
+        if group.is_scan or group.pushed or group.felt:
+            return []
+        runs = self.stopped_runs(Request("", None, request.index), number) or []
+        return [run for run in runs if isinstance(run, (Motion, DropRun))]
+
+    def _list_settings(self, request: Request, number: int) -> list[DropSetting]:
+        """Of one group, in the order of its speeds and spacings."""
+        group, changed, settings = self.groups[number], request.variant != "", []
+        for position in group.sparse if request.sparse else range(len(group.speeds)):
+            setting = self.setting(
+                group, group.speeds[position], strength_node(request.index), request.sparse
+            )
+            setting = request.change(setting) if request.change is not None else setting
+            for factor in group.spacings(request.sparse, position, changed):
+                settings.append(setting.replace(spacing=factor * setting.spacing))
+        return settings
+
+    def _get_parts(
+        self, settings: Sequence[DropSetting], parts: Sequence[Part], text: str
+    ) -> list[AnyPart | FailedRun]:
         if not settings:
-            return
-        runs = self.store.get_parts(
+            return []
+        return self.store.get_parts(
             settings,
             parts,
             workers=self.workers,
@@ -315,10 +373,6 @@ class RunGrid:
             progress=self.progress,
             text=text,
         )
-        at = 0
-        for request, number, count in places:
-            self.runs[request.of(number)] = runs[at : at + count]
-            at += count
 
     def stopped_runs(self, request: Request, number: int) -> list[AnyPart] | None:
         """Runs of one group, in the order of its speeds and spacings, or None where one failed or never stopped."""
