@@ -71,8 +71,9 @@ def main() -> None:
             for a, b in zip(change[:, 0], said[:, 0], strict=True)
         )
         term = terms[name]
+        unit = "" if term.unit == "1" else f" {term.unit}"
         print(
-            f"| {term.title}, {LAWS[name]:g} {term.unit} | {cells} | {100 * off[0]:.0f} % | {100 * off[1]:.0f} % |"
+            f"| {term.title}, {LAWS[name]:g}{unit} | {cells} | {100 * off[0]:.0f} % | {100 * off[1]:.0f} % |"
         )
 
 

@@ -248,7 +248,7 @@ class Problem:
         names = {name for name, _, _ in wanted} if sparse or integrated else set()
         laws = {name for name in names if self.acts_on_projectile(name)}
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, sparse, name in laws)
+            Request(self._variant(name, a), self.change(name, a), index, sparse, True, name in laws)
             for name, a, index in wanted
         ]
         plain = sorted({request.plain for request in changed}, key=lambda request: request.index)

@@ -123,10 +123,12 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     laws = list_laws(problem, fit)
     index = round(place_strength(fit.log_p_m))  # not screening's, which may lie where soft dust costs most
     problem.require_base([index])
+    plain = Request("", None, index, wide=True)
+    problem.grid.require([plain], "free law")
     deepest = {
         run.setting: run.penetration_depth
         for number in range(len(problem.groups))
-        for run in problem.grid.stopped_runs(Request("", None, index), number) or ()
+        for run in problem.grid.stopped_runs(plain, number) or ()
         if not isinstance(run, Push)
     }
     hats = {name: hat for law in laws for name, hat in make_hats(law, deepest).items()}

@@ -7,7 +7,7 @@ are such drops: z = Z(τ, l), v = V(τ, l) with τ the time over their stopping 
     Z_τ dτ + Z_l dl = 0,  V_τ dτ + V_l dl = a dt,  and dτ = dt/T as without it
 
 where a is the acceleration more than without it. The drop stops where τ = 1 and springs back as the one it has come to be.
-How near that comes to simulations: docs/free-law.md.
+How near that comes to simulations: docs/deflection.md.
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ def acts_on_projectile(plain: DropSetting, changed: DropSetting) -> bool:
     return changed.replace(**{key: getattr(plain, key) for key in FORCES}) == plain
 
 
-def deflect(runs: Sequence[Motion | DropRun], changed: Sequence[Sequence[DropSetting]]) -> list[list[Motion | None]]:
+def deflect(
+    runs: Sequence[Motion | DropRun], changed: Sequence[Sequence[DropSetting]]
+) -> list[list[Motion | None]]:
     """Motions of drops with laws on their projectile.
 
     Parameters
