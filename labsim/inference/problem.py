@@ -238,17 +238,19 @@ class Problem:
         text: str = "effects",
         *,
         sparse: bool = False,
-        integrated: bool = False,
+        rough: bool = False,
     ) -> None:
         """Runs of (effect, amplitude, strength index) and what they change against the same spacing without the effect; at few
-        speeds they are fingerprints. Of these, or where ``integrated``, laws on the projectile alone take no runs."""
+        speeds they are fingerprints. Where ``rough``, as these are, spacings are wider and laws on the projectile alone take no
+        runs."""
+        rough = rough or sparse
         if sparse:  # no fingerprint is looked at where there are changes
             known = {name for each in self.features for name in each.table.changes}
             wanted = [each for each in wanted if each[0] not in known]
-        names = {name for name, _, _ in wanted} if sparse or integrated else set()
+        names = {name for name, _, _ in wanted} if rough else set()
         laws = {name for name in names if self.acts_on_projectile(name)}
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, sparse, True, name in laws)
+            Request(self._variant(name, a), self.change(name, a), index, sparse, rough, name in laws)
             for name, a, index in wanted
         ]
         plain = sorted({request.plain for request in changed}, key=lambda request: request.index)

@@ -178,7 +178,8 @@ def _begin() -> None:
     """One thread a run; leave when the parent is gone, even when it was killed without a word; signals are the parent's."""
     for number in OF_THE_PARENT:
         signal.signal(number, signal.SIG_IGN)
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    # none of Numba's: where one changes, it forgets where compiled code is kept
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     parent = multiprocessing.parent_process()
     if parent is not None:

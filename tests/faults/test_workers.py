@@ -74,6 +74,18 @@ def test_a_worker_follows_its_caller_into_another_folder(tmp_path: Path, monkeyp
         workers.end()
 
 
+def test_a_worker_compiles_into_the_cache() -> None:
+    """And not into the folder that somebody works in, though the script that it imports again has imported labsim: Numba forgets
+    a folder that is set where a variable of its own changes."""
+    code = (
+        "import labsim.sph, numba; from labsim.sph._jit import loop_folder; from labsim.runs.processes import _begin; "
+        "kept = loop_folder(); _begin(); numba.config.reload_config(); assert loop_folder() == kept, loop_folder()"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_what_was_not_begun_is_cancelled() -> None:
     workers = ProcessWorkers(1)
     calls = [workers.submit(time.sleep, 60.0) for _ in range(3)]

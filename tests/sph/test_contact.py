@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from labsim.inference.emulation.grid import CHANGE_CELLS, DEFAULT_CELLS
+from labsim.inference.emulation.grid import COARSE_CELLS, DEFAULT_CELLS
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, simulate
 from labsim.sph import particles as rows
@@ -69,13 +69,13 @@ def test_exchange_keeps_volume_and_leaves_elastic_dust_alone():
     assert np.all(evolve_body(body, block).state[rows.EXCHANGE] == 0.0)
 
 
-@pytest.mark.parametrize("cells", [CHANGE_CELLS, DEFAULT_CELLS])
+@pytest.mark.parametrize("cells", [COARSE_CELLS, DEFAULT_CELLS])
 @pytest.mark.parametrize(
     ("speed", "depth", "stop", "above_20", "tolerance"),
     [(0.65, 0.689e-3, 1.762e-3, 0.76, 0.06), (0.20, 0.217e-3, 1.628e-3, 0.104, 0.35)],
 )
 def test_a_bead_against_two_other_methods(speed, depth, stop, above_20, tolerance, cells):
-    """Depth and stopping time of a material-point solver's limits, volumes of a mesh; a/dx of effects and of fits."""
+    """Depth and stopping time of a material-point solver's limits, volumes of a mesh; a/dx of fingerprints and of fits."""
     run = simulate(DropSetting(BEAD, speed, Material(), spacing=RADIUS / cells))
     volume = {phi: run.compacted_volume(phi) / BEAD_VOLUME for phi in (0.17, 0.20, 0.22)}
     print(f"D {run.penetration_depth / depth - 1:+.2%} T_s {run.stopping_time / stop - 1:+.2%} V {volume} "

@@ -123,7 +123,7 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     laws = list_laws(problem, fit)
     index = round(place_strength(fit.log_p_m))  # not screening's, which may lie where soft dust costs most
     problem.require_base([index])
-    plain = Request("", None, index, wide=True)
+    plain = Request("", None, index, rough=True)
     problem.grid.require([plain], "free law")
     deepest = {
         run.setting: run.penetration_depth
@@ -137,7 +137,7 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     free = replace(problem, effects={**problem.effects, **hats}, budget=budget)
     # at every speed: what a force at some depth changes has a peak where drops end there
     nodes = [(name, hat.amplitudes[0].step, index) for name, hat in hats.items()]
-    free.require_changes(nodes, "free law", integrated=True)
+    free.require_changes(nodes, "free law", rough=True)
     names = [name for name in hats if has_runs(problem, name)]
     scales = {hat: law.scale for law in laws for hat in law.hats}
     free, formulas, units = add_terms(free)
@@ -177,7 +177,7 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
         }
         bent = sorted(clear, key=lambda name: -clear[name])[:MOST_BENT]
         nodes = [(n, a, index) for n in bent for a in amplitude_nodes(hats[n], values[n], sparse=True)]
-        free.require_changes(nodes, "free law, large", integrated=True)
+        free.require_changes(nodes, "free law, large", rough=True)
         nuisances, _ = move_nuisances(problem, nuisances, blocks, weighted)
     return found
 

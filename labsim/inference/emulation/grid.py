@@ -40,9 +40,9 @@ SAME_SPEED, MOST_SPEEDS, FELT_RATIO = 1.08, 5, 1.3
 # of the stopping time: what runs of filmed drops need for the way back up (observations/rebounds.py), and all others
 LIFTING, SETTLING = 0.34, 0.16
 DEFAULT_CELLS = 5  # spacings in a tip radius; docs/other-methods.md: 0.33 % of the depth left at that
-# of what effects change, which is off by a thirtieth of itself at that (docs/discretisation.md). More where the nominal model has
+# of a first look at what effects change: it needs less than what it is added to (docs/discretisation.md). More where fits have
 # more than the usual, in proportion
-CHANGE_CELLS = 4
+COARSE_CELLS = 4
 PUSH_CELLS = 4  # of pushes: what is calibrated takes up the rest (docs/force-records.md)
 PUSHED = (4.0, 8.0)  # tip radii, between which a push is simulated; resistance still rises there
 INERTIA = 0.005  # ρ v² of a push over its resistance
@@ -90,16 +90,16 @@ class ProjectileGroup:
 class Request:
     """Runs of all groups at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    sparse : of fingerprints, at few speeds, of scans with wider spacings. wide : of what effects change, of films with wider
-    spacings. integrated : what acts on the projectile alone is taken from the nominal model's runs (deflection.py), at all
-    speeds, as far as they know it.
+    sparse : of fingerprints, at few speeds, of scans with wider spacings. rough : for a first look, of films with wider spacings.
+    integrated : what acts on the projectile alone is taken from the nominal model's runs (deflection.py), at all speeds, as far
+    as they know it.
     """
 
     variant: str
     change: Change | None
     index: float
     sparse: bool = False
-    wide: bool = False
+    rough: bool = False
     integrated: bool = False
 
     @property
@@ -109,7 +109,7 @@ class Request:
 
     def of(self, number: int) -> RunKey:
         """Under what the runs of one group are kept."""
-        return self.variant, self.index, self.sparse, self.wide, number
+        return self.variant, self.index, self.sparse, self.rough, number
 
 
 def speed_nodes(slowest: float, fastest: float, ratio: float = SPEED_RATIO) -> tuple[float, ...]:
@@ -274,14 +274,14 @@ class RunGrid:
     integrated: set[RunKey] = field(default_factory=set)  # of these, those that are no simulations
 
     def setting(
-        self, group: ProjectileGroup, speed: float, p_m: float, sparse: bool = False, wide: bool = False
+        self, group: ProjectileGroup, speed: float, p_m: float, sparse: bool = False, rough: bool = False
     ) -> DropSetting:
         """The nominal model of the campaign for one node."""
         usual = self.cells
         if group.felt:
             usual = max(self.cells, FELT_CELLS)
-        elif wide:
-            usual = min(self.cells, max(CHANGE_CELLS, self.cells * CHANGE_CELLS // DEFAULT_CELLS))
+        elif rough:
+            usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
         of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
         after_stop = SETTLING if group.is_scan or group.pushed or group.felt else LIFTING
@@ -325,7 +325,7 @@ class RunGrid:
         for request, number in wanted:
             plain = self._list_films(request, number)
             settings = (
-                self._list_settings(replace(request, sparse=False, wide=False), number) if plain else []
+                self._list_settings(replace(request, sparse=False, rough=False), number) if plain else []
             )
             if plain and all(map(acts_on_projectile, (run.setting for run in plain), settings)):
                 laws.setdefault((number, request.index), []).append((request, settings))
@@ -359,7 +359,7 @@ class RunGrid:
         group, changed, settings = self.groups[number], request.variant != "", []
         for position in group.sparse if request.sparse else range(len(group.speeds)):
             strength = strength_node(request.index)
-            setting = self.setting(group, group.speeds[position], strength, request.sparse, request.wide)
+            setting = self.setting(group, group.speeds[position], strength, request.sparse, request.rough)
             setting = request.change(setting) if request.change is not None else setting
             for factor in group.spacings(request.sparse, position, changed):
                 settings.append(setting.replace(spacing=factor * setting.spacing))
