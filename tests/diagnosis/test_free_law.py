@@ -181,6 +181,17 @@ def test_hats_change_nothing_at_null_and_add_up(law: FreeLaw) -> None:
         assert list(table.values()) == pytest.approx([0.0] + [0.1 * PRESSURE * area] * len(SPEEDS))
 
 
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.over)
+def test_no_step_asks_for_what_no_run_says(law: FreeLaw) -> None:
+    """About a p_m that has run away linear steps of mass that sticks (p12) asked for 34 times the unit of a force."""
+    for hat in make_hats(law).values():
+        step = hat.amplitudes[0].step
+        for asked in (1e9, -1e9, 0.5 * step):
+            held = free_law.hold_hat(hat, asked)
+            hat.apply(a_setting(), {"amplitude": held}, a_place())
+            assert abs(held) <= 8.0 * step and (held == asked or abs(asked) > step)
+
+
 def test_a_force_that_a_drop_does_not_meet_costs_no_run() -> None:
     slow = a_setting(0.25)
     deepest = {slow: 0.9 * RADIUS}

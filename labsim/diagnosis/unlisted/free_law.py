@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from ...effects import Effect
 from ...inference.emulation.grid import Request
 from ...inference.emulation.nodes import amplitude_nodes, place_strength
 from ...inference.fits.blocks import Block, solve_globals
@@ -38,6 +39,7 @@ SIZES = (0.1, 0.2, 0.4, 0.8)
 # by 0.08 to 0.13 where runs at 120 Pa, in proportion, say 0.13 to 0.14
 ONE_AMPLITUDE = 0.15
 CLEAR = 3.0  # standard deviations from which a hat larger than its step is simulated about its estimate too
+FARTHEST = 8.0  # steps of a hat, the largest that is simulated
 MOST_BENT = 3  # such hats in a round
 ANYWHERE = (-1e3, 1e3)  # limits of ln p_m that are none
 ROUNDS = 2  # of Gauss and Newton about the law that is found
@@ -167,7 +169,10 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
         before, log_p_m = log_p_m, float(np.clip(log_p_m + np.clip(step[0], -0.7, 0.7), low, high))
         # the others' best where p_m stops short of its own
         step += covariance[0] / covariance[0, 0] * (log_p_m - before - step[0])
-        best = {name: values[name] + float(part) for name, part in zip(own, step[1:], strict=True)}
+        best = {
+            name: hold_hat(hats[name], values[name] + float(part))
+            for name, part in zip(own, step[1:], strict=True)
+        }
         values = dict.fromkeys(names, 0.0) | best
         sigma = np.sqrt(np.diag(covariance)[1:])
         clear = {
@@ -180,6 +185,13 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
         free.require_changes(nodes, "free law, large", rough=True)
         nuisances, _ = move_nuisances(problem, nuisances, blocks, weighted)
     return found
+
+
+def hold_hat(hat: Effect, amplitude: float) -> float:
+    """An amplitude kept within what runs know: about a p_m that has run away a linear model asks for anything."""
+    parameter = hat.amplitudes[0]
+    farthest = FARTHEST * parameter.step
+    return parameter.hold(min(max(amplitude, -farthest), farthest))
 
 
 def choose_hats(found: Tangents, freedom: str) -> list[str]:

@@ -40,8 +40,8 @@ ROUGH, ROUGH_SHARE = (
 # were among these (p12)
 MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of a place, likewise
-# what a film changes has a peak where drops end in it, which few speeds miss
-PEAKED = ("force of depth", "force of depth in mm", "strength of depth")
+# what a layer changes has a peak where drops end in it, which few speeds miss; a film's is known at all
+PEAKED = ("strength of depth",)
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
