@@ -201,8 +201,8 @@ def fit_siblings(
     form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as ``units`` has them in order.
 
     Places of the best formula, of those hardly told from it, and ``open_places``; until something explains the data all places
-    that few runs (``sparse``) lead to, one after another, the dear ones last. The best, in the end MOST_REFINED of them, have
-    runs about themselves.
+    that few runs (``sparse``) lead to, one after another: the leading one, those that take no runs, the dear ones last. The best,
+    in the end MOST_REFINED of them, have runs about themselves.
     """
     found, seen, refined = list(fits), set[str](), set[Hypothesis]()
     while True:
@@ -215,7 +215,10 @@ def fit_siblings(
             begun |= {
                 place: further[place] for place in open_places if place in further and place not in begun
             }
-        place = next((each for each in begun if each not in seen), None)
+        left = [each for each in begun if each not in seen]
+        place = min(
+            left, key=lambda each: _rank_place(problem, each, each == next(iter(begun))), default=None
+        )
         if place is None:
             return _refine_leading(problem, found, MOST_REFINED, refined)
         seen.add(place)
@@ -236,6 +239,16 @@ def fit_siblings(
                     again = fit_from_strengths(problem, nominal, (name,), top)
                     siblings += [again] if again is not None else []
         found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
+
+
+def _rank_place(problem: Problem, place: str, leads: bool) -> int:
+    """When a place has its turn: the leading one first, then those whose laws take no runs, and last those that take most."""
+    name = next(
+        name for name, term in list_terms().items() if term.place == place and name in problem.effects
+    )
+    if leads or place in PEAKED:
+        return 0 if leads else 3
+    return 1 if problem.acts_on_projectile(name) or not problem.affects_simulation(name) else 2
 
 
 def list_open_places(unknown: UnknownFit) -> list[str]:
@@ -266,7 +279,7 @@ def _list_places(
     for fit in sorted((*fits, *sparse), key=lambda fit: -fit.evidence):
         for name in fit.hypothesis if fit.evidence > top - behind else ():
             begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
-    return dict(sorted(begun.items(), key=lambda each: each[0] in PEAKED))
+    return begun
 
 
 def _refine_leading(problem: Problem, fits: Sequence[Fit], most: int, refined: set[Hypothesis]) -> list[Fit]:
