@@ -81,8 +81,10 @@ def fit_from_strengths(
 ) -> Fit | None:
     """The best sparse fit of one hypothesis from several strengths; None where its runs lead nowhere.
 
-    top : ln evidence of the best that is known; a start far behind it is not followed. factors : on the nominal p_m.
+    top : ln evidence of the best that is known; a start far behind it is not followed, unless that takes no runs. factors : on
+    the nominal p_m.
     """
+    free = all(map(problem.acts_on_projectile, names))
     low, high = (math.log(p) for p in problem.campaign.p_m_range)
     found: Fit | None = None
     for shift in np.log(factors):
@@ -98,9 +100,9 @@ def fit_from_strengths(
                 sparse=True,
                 nuisances=nominal,
                 iterations=FIRST_STEPS,
-                least=top - NOWHERE,
+                least=-math.inf if free else top - NOWHERE,
             )
-            if fit.evidence > top - HOPELESS:
+            if free or fit.evidence > top - HOPELESS:
                 begin = (fit.log_p_m, fit.values)
                 fit = fit_hypothesis(problem, names, begin, sparse=True, nuisances=fit)
             found = fit if found is None or fit.evidence > found.evidence else found

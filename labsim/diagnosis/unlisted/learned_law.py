@@ -146,6 +146,7 @@ def fit_formulas(
     if not _explains(fits or [nominal]):
         best = max(fits, key=lambda fit: fit.evidence, default=nominal)
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
+        near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
     return fit_siblings(problem, nominal, fits, sparse, units, open_places)
@@ -154,7 +155,7 @@ def fit_formulas(
 def fit_anew(
     problem: Problem, nominal: Fit, singles: Sequence[Hypothesis], units: Mapping[str, float]
 ) -> list[Fit]:
-    """The terms that get furthest before p_m is moved, fitted from there."""
+    """The terms that get furthest before p_m is moved, fitted from there; of those whose laws take no runs, once it has moved."""
     # few runs do not stand beside more: they get names of their own
     probes = {f"{name} anew": problem.effects[name] for (name,) in singles}
     probing = replace(problem, effects={**problem.effects, **probes})
@@ -163,7 +164,10 @@ def fit_anew(
         sizes = [sign * share * units[name] for sign in (1.0, -1.0) for share in SHARES]
         for strength in _list_strengths(problem, nominal):
             starts = [fit for size in sizes for fit in _start(probing, probe, strength, size, nominal)]
-            begun.setdefault((name,), []).extend(sorted(starts, key=lambda fit: -fit.evidence)[:1])
+            starts = sorted(starts, key=lambda fit: -fit.evidence)[:1]
+            if problem.acts_on_projectile(name):
+                starts = [fit for each in starts for fit in _follow(probing, each)]
+            begun.setdefault((name,), []).extend(starts)
     best = {names: max(fit.evidence for fit in starts) for names, starts in begun.items() if starts}
     fits = []
     for names in sorted(best, key=lambda names: -best[names])[:MOST_ANEW]:
@@ -171,6 +175,14 @@ def fit_anew(
             values = dict(zip(names, start.values.values(), strict=True))
             fits += _fit(problem, names, (start.log_p_m, values), start)
     return fits
+
+
+def _follow(problem: Problem, start: Fit) -> list[Fit]:
+    """A start on few runs, fitted on them; none where they lead nowhere."""
+    with suppress(LabsimError):
+        begin = (start.log_p_m, start.values)
+        return [fit_hypothesis(problem, start.hypothesis, begin, nuisances=start, sparse=True)]
+    return []
 
 
 def _list_strengths(problem: Problem, nominal: Fit) -> list[float]:
@@ -201,7 +213,7 @@ def fit_siblings(
     form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as ``units`` has them in order.
 
     Places of the best formula, of those hardly told from it, and ``open_places``; until something explains the data all places
-    that few runs (``sparse``) lead to, one after another: the leading one, those that take no runs, the dear ones last. The best,
+    that few runs (``sparse``) lead to, one after another: those that take no runs first, the dear ones last. The best,
     in the end MOST_REFINED of them, have runs about themselves.
     """
     found, seen, refined = list(fits), set[str](), set[Hypothesis]()
@@ -216,9 +228,7 @@ def fit_siblings(
                 place: further[place] for place in open_places if place in further and place not in begun
             }
         left = [each for each in begun if each not in seen]
-        place = min(
-            left, key=lambda each: _rank_place(problem, each, each == next(iter(begun))), default=None
-        )
+        place = min(left, key=lambda each: _rank_place(problem, each), default=None)
         if place is None:
             return _refine_leading(problem, found, MOST_REFINED, refined)
         seen.add(place)
@@ -241,14 +251,14 @@ def fit_siblings(
         found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
 
 
-def _rank_place(problem: Problem, place: str, leads: bool) -> int:
-    """When a place has its turn: the leading one first, then those whose laws take no runs, and last those that take most."""
+def _rank_place(problem: Problem, place: str) -> int:
+    """When a place has its turn: those whose laws take no runs first, and last those that take most."""
+    if place in PEAKED:
+        return 2
     name = next(
         name for name, term in list_terms().items() if term.place == place and name in problem.effects
     )
-    if leads or place in PEAKED:
-        return 0 if leads else 3
-    return 1 if problem.acts_on_projectile(name) or not problem.affects_simulation(name) else 2
+    return 0 if problem.acts_on_projectile(name) or not problem.affects_simulation(name) else 1
 
 
 def list_open_places(unknown: UnknownFit) -> list[str]:
