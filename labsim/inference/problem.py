@@ -153,7 +153,7 @@ class Problem:
             return
         self._filled.add(request.of(number))
         integrated = request.of(number) in self.grid.integrated
-        plain = Request("", None, request.index) if integrated else request.plain
+        plain = request.base if integrated else request.plain
         before, after = self._extract_plain(number, plain), self._extract(number, request)
         spacings = self.groups[number].spacings  # a change is one from the run of the same spacing
         for (table, features), (_, features_before) in zip(after, before, strict=True):
@@ -191,12 +191,12 @@ class Problem:
         return back == setting
 
     def acts_on_projectile(self, name: str) -> bool:
-        """Whether an effect changes nothing of a drop but what acts on the projectile alone."""
+        """Whether an effect changes nothing of a drop but what acts on the projectile alone, so that films need no runs of it.
+        Those of accelerometers and pushes are simulated in any case."""
         effect, setting = self._find(name), self.state(self.groups[0])
-        amplitude = effect.amplitudes[0].step if effect.amplitudes else 0.0
-        return effect.change_setting is not None and acts_on_projectile(
-            setting, self.change(name, amplitude)(setting)
-        )
+        if self.felt or self.pushed or effect.change_setting is None or not effect.amplitudes:
+            return False
+        return acts_on_projectile(setting, self.change(name, effect.amplitudes[0].step)(setting))
 
     def at(self, name: str, amplitude: float) -> dict[str, float]:
         """Values of an effect's parameters at an amplitude, kept inside the limits."""
@@ -250,11 +250,18 @@ class Problem:
         names = {name for name, _, _ in wanted} if rough else set()
         laws = {name for name in names if self.acts_on_projectile(name)}
         changed = [
-            Request(self._variant(name, a), self.change(name, a), index, sparse, rough, name in laws)
+            Request(
+                self._variant(name, a),
+                self.change(name, a),
+                index,
+                sparse=sparse,
+                rough=rough,
+                integrated=name in laws,
+            )
             for name, a, index in wanted
         ]
         plain = sorted({request.plain for request in changed}, key=lambda request: request.index)
-        plain += [Request("", None, request.index) for request in changed if request.integrated]
+        plain += [request.base for request in changed if request.integrated]
         self.grid.require([*plain, *changed], text)
         for number in range(len(self.groups)):
             for (name, amplitude, _), request in zip(wanted, changed, strict=True):

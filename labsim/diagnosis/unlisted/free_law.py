@@ -20,7 +20,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...effects import Effect
 from ...inference.emulation.grid import Request
-from ...inference.emulation.nodes import amplitude_nodes, place_strength
+from ...inference.emulation.nodes import SPARSE_LADDER, amplitude_nodes, place_strength
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import cut_gaussian
 from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_p_value
@@ -39,7 +39,6 @@ SIZES = (0.1, 0.2, 0.4, 0.8)
 # by 0.08 to 0.13 where runs at 120 Pa, in proportion, say 0.13 to 0.14
 ONE_AMPLITUDE = 0.15
 CLEAR = 3.0  # standard deviations from which a hat larger than its step is simulated about its estimate too
-FARTHEST = 8.0  # steps of a hat, the largest that is simulated
 MOST_BENT = 3  # such hats in a round
 ANYWHERE = (-1e3, 1e3)  # limits of ln p_m that are none
 ROUNDS = 2  # of Gauss and Newton about the law that is found
@@ -190,7 +189,7 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
 def hold_hat(hat: Effect, amplitude: float) -> float:
     """An amplitude kept within what runs know: about a p_m that has run away a linear model asks for anything."""
     parameter = hat.amplitudes[0]
-    farthest = FARTHEST * parameter.step
+    farthest = SPARSE_LADDER[-1] * parameter.step
     return parameter.hold(min(max(amplitude, -farthest), farthest))
 
 

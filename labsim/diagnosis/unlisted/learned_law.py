@@ -40,8 +40,8 @@ ROUGH, ROUGH_SHARE = (
 # were among these (p12)
 MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of a place, likewise
-# what a layer changes has a peak where drops end in it, which few speeds miss; a film's is known at all
-PEAKED = ("strength of depth",)
+# what a layer changes has a peak where drops end in it, which few speeds miss: all are simulated
+PEAKED = "strength of depth"
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
@@ -166,7 +166,11 @@ def fit_anew(
             starts = [fit for size in sizes for fit in _start(probing, probe, strength, size, nominal)]
             starts = sorted(starts, key=lambda fit: -fit.evidence)[:1]
             if problem.acts_on_projectile(name):
-                starts = [fit for each in starts for fit in _follow(probing, each)]
+                starts = [
+                    fit
+                    for each in starts
+                    for fit in _fit(probing, each.hypothesis, (each.log_p_m, each.values), each, sparse=True)
+                ]
             begun.setdefault((name,), []).extend(starts)
     best = {names: max(fit.evidence for fit in starts) for names, starts in begun.items() if starts}
     fits = []
@@ -175,14 +179,6 @@ def fit_anew(
             values = dict(zip(names, start.values.values(), strict=True))
             fits += _fit(problem, names, (start.log_p_m, values), start)
     return fits
-
-
-def _follow(problem: Problem, start: Fit) -> list[Fit]:
-    """A start on few runs, fitted on them; none where they lead nowhere."""
-    with suppress(LabsimError):
-        begin = (start.log_p_m, start.values)
-        return [fit_hypothesis(problem, start.hypothesis, begin, nuisances=start, sparse=True)]
-    return []
 
 
 def _list_strengths(problem: Problem, nominal: Fit) -> list[float]:
@@ -240,10 +236,10 @@ def fit_siblings(
             begin = (start.log_p_m, {name: size * units[name]})
             with suppress(LabsimError):
                 siblings.append(
-                    fit_hypothesis(problem, (name,), begin, sparse=place not in PEAKED, nuisances=start)
+                    fit_hypothesis(problem, (name,), begin, sparse=place != PEAKED, nuisances=start)
                 )
             # where the wrong form led, the right one's runs may fail
-            if place not in PEAKED and not explained:
+            if place != PEAKED and not explained:
                 top = max([nominal.evidence, *(fit.evidence for fit in siblings)])
                 with suppress(LabsimError):
                     again = fit_from_strengths(problem, nominal, (name,), top)
@@ -253,7 +249,7 @@ def fit_siblings(
 
 def _rank_place(problem: Problem, place: str) -> int:
     """When a place has its turn: those whose laws take no runs first, and last those that take most."""
-    if place in PEAKED:
+    if place == PEAKED:
         return 2
     name = next(
         name for name, term in list_terms().items() if term.place == place and name in problem.effects
@@ -325,11 +321,16 @@ def _refine(problem: Problem, nominal: Fit, sparse: Sequence[Fit], most: int) ->
 
 
 def _fit(
-    problem: Problem, names: Hypothesis, start: tuple[float, Mapping[str, float]], known: Fit
+    problem: Problem,
+    names: Hypothesis,
+    start: tuple[float, Mapping[str, float]],
+    known: Fit,
+    *,
+    sparse: bool = False,
 ) -> list[Fit]:
     """A formula fitted; none where its runs fail: it is no formula for this dust."""
     with suppress(LabsimError):
-        return [fit_hypothesis(problem, names, start, nuisances=known)]
+        return [fit_hypothesis(problem, names, start, nuisances=known, sparse=sparse)]
     return []
 
 

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from ...records import FloatArray
 from ...runs.parts import Motion
-from ...sph import DropRun, DropSetting
+from ...sph import DropSetting
 
 FORCES = ("force_of_depth", "force_of_speed", "mass_of_depth", "gathered_of_depth")
 STEPS, LONGEST = 150, 4  # a stopping time; stopping times without the law within which a drop has to stop
@@ -34,9 +34,7 @@ def acts_on_projectile(plain: DropSetting, changed: DropSetting) -> bool:
     return changed.replace(**{key: getattr(plain, key) for key in FORCES}) == plain
 
 
-def deflect(
-    runs: Sequence[Motion | DropRun], changed: Sequence[Sequence[DropSetting]]
-) -> list[list[Motion | None]]:
+def deflect(runs: Sequence[Motion], changed: Sequence[Sequence[DropSetting]]) -> list[list[Motion | None]]:
     """Motions of drops with laws on their projectile.
 
     Parameters
@@ -69,13 +67,13 @@ def deflect(
         rigid = z_at * v_l - z_l * v_at
         return 1.0 / stop - z_l * push / rigid, z_at * push / rigid, z, v
 
+    rate_at, rate_l, _, _ = move(at, log_speed)
     for _ in range(LONGEST * STEPS):
-        rate_at, rate_l, _, _ = move(at, log_speed)
         rate_at, rate_l, _, _ = move(at + 0.5 * step * rate_at, log_speed + 0.5 * step * rate_l)
         ends = at + step * rate_at >= 1.0
         own = np.where(ends, (1.0 - at) / np.maximum(rate_at, 1e-300), step) * going
         at, log_speed, time = at + own * rate_at, log_speed + own * rate_l, time + own
-        _, _, z, v = move(at, log_speed)
+        rate_at, rate_l, z, v = move(at, log_speed)
         logs.append((time.copy(), z, v))
         going &= ~ends & (log_speed > low) & (log_speed < high) & (at > -1.0)
         if not going.any():
@@ -115,7 +113,7 @@ def _describe(
 class _Paths:
     """Runs of one drop at rising impact speeds: ln D, ln T and depth over D at ``fractions`` of T, cubic in ln v0."""
 
-    def __init__(self, runs: Sequence[Motion | DropRun]) -> None:
+    def __init__(self, runs: Sequence[Motion]) -> None:
         self.log_speeds = np.log([run.setting.impact_speed for run in runs])
         end = 1.0 + min(run.setting.after_stop for run in runs)
         self.fractions = np.concatenate([TOWARDS_STOP, np.arange(1.025, end, 0.025)])

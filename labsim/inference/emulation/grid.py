@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
+from typing import cast
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,7 +22,7 @@ from ...records import Motion as Led
 from ...runs.parts import AnyPart, Compaction, Motion, Part, Push
 from ...runs.run_file import FailedRun
 from ...runs.store import Progress, RunStore
-from ...sph import DropRun, DropSetting
+from ...sph import DropSetting
 from ...sph.materials import find_law
 from .deflection import acts_on_projectile, deflect
 
@@ -106,6 +107,11 @@ class Request:
     def plain(self) -> Request:
         """The same runs of the nominal model."""
         return replace(self, variant="", change=None, integrated=False)
+
+    @property
+    def base(self) -> Request:
+        """The runs of the nominal model that changes are added to."""
+        return Request("", None, self.index)
 
     def of(self, number: int) -> RunKey:
         """Under what the runs of one group are kept."""
@@ -321,18 +327,19 @@ class RunGrid:
         """Motions of films with laws on the projectile, from the nominal model's runs; what has to be simulated after all is
         returned: other groups, other laws."""
         rest: list[tuple[Request, int]] = []
-        laws: dict[tuple[int, float], list[tuple[Request, list[DropSetting]]]] = {}
+        laws: dict[tuple[int, float], tuple[list[Motion], list[tuple[Request, list[DropSetting]]]]] = {}
         for request, number in wanted:
-            plain = self._list_films(request, number)
-            settings = (
-                self._list_settings(replace(request, sparse=False, rough=False), number) if plain else []
-            )
-            if plain and all(map(acts_on_projectile, (run.setting for run in plain), settings)):
-                laws.setdefault((number, request.index), []).append((request, settings))
+            plain = None if self.groups[number].is_scan else self.stopped_runs(request.base, number)
+            settings = self._list_settings(replace(request, sparse=False, rough=False), number)
+            if plain is not None and all(
+                acts_on_projectile(run.setting, setting) for run, setting in zip(plain, settings, strict=True)
+            ):
+                known = laws.setdefault((number, request.index), (cast("list[Motion]", plain), []))
+                known[1].append((request, settings))
             else:
                 rest.append((request, number))
-        for (number, _), asked in laws.items():
-            found = deflect(self._list_films(asked[0][0], number), [settings for _, settings in asked])
+        for (number, _), (base, asked) in laws.items():
+            found = deflect(base, [settings for _, settings in asked])
             beyond = [
                 setting
                 for (_, settings), motions in zip(asked, found, strict=True)
@@ -345,14 +352,6 @@ class RunGrid:
                 self.runs[key] = [next(runs) if motion is None else motion for motion in motions]
                 self.integrated.add(key)
         return rest
-
-    def _list_films(self, request: Request, number: int) -> list[Motion | DropRun]:
-        """The nominal model's runs at a request's strength, if the group is filmed drops alone and all of them stopped."""
-        group = self.groups[number]
-        if group.is_scan or group.pushed or group.felt:
-            return []
-        runs = self.stopped_runs(Request("", None, request.index), number) or []
-        return [run for run in runs if isinstance(run, (Motion, DropRun))]
 
     def _list_settings(self, request: Request, number: int) -> list[DropSetting]:
         """Of one group, in the order of its speeds and spacings."""

@@ -7,6 +7,8 @@ import math
 from ...effects import Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
+SPARSE_LADDER = (1.0, 3.0, 8.0)  # steps of an effect, of which few runs are made
+
 
 def place_strength(log_p_m: float) -> float:
     """Where a strength lies among the nodes: an integer at a node."""
@@ -75,9 +77,9 @@ def amplitude_nodes(
     if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
         wanted = [sign]
     else:
-        ladder = [1.0, 3.0, 8.0] if sparse else [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0]
+        ladder = SPARSE_LADDER if sparse else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
         if bent:
-            ladder = sorted({0.5, *ladder} if sparse else {0.25, 0.5, 0.75, 1.5, *ladder})
+            ladder = tuple(sorted({0.5, *ladder} if sparse else {0.25, 0.5, 0.75, 1.5, *ladder}))
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
         below = [m for m in ladder if m < abs(place)] or above[1:2]
         wanted = [sign * below[-1], *(sign * m for m in above[: 1 + around])]
