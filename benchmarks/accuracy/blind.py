@@ -170,6 +170,22 @@ def compare_gain(found: Diagnosis, truth: dict) -> dict:
     }
 
 
+def name_commit() -> str:
+    """Of the code that judges."""
+    asked = ["git", "-C", str(Path(__file__).parent), "rev-parse", "--short", "HEAD"]
+    return subprocess.run(asked, capture_output=True, text=True).stdout.strip()
+
+
+def judge_labelled(
+    campaign: Path, truth: dict, store: RunStore, *, workers: int | None = None, cells: int | None = None
+) -> dict:
+    """Diagnose the campaign in a folder, then set beside it what is hidden there."""
+    found = diagnose_campaign(read_campaign(campaign), store, workers=workers, cells=cells)
+    row = describe(campaign.name, found) | {"commit": name_commit(), "date": str(date.today())}
+    row |= compare_gain(found, truth)
+    return row | {"truth": {key: value for key, value in truth.items() if key != "drops"}}
+
+
 def read_rows(*paths: Path) -> list[dict]:
     """All lines of all files."""
     return [json.loads(line) for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
@@ -235,26 +251,23 @@ def main() -> None:
     truths = options.folder / "truth.json"
     if only - names or not truths.exists():
         parser.error(f"{options.folder} has no {', '.join(sorted(only - names)) or truths.name}")
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
-    ).stdout.strip()
     known = json.loads(truths.read_text())
     rows = read_rows(options.rows) if options.rows and options.rows.exists() else []
     for name in sorted(only or names):
         if name in {row["campaign"] for row in rows}:
             continue
         began = time.perf_counter()
-        found = diagnose_campaign(
-            read_campaign(options.folder / name),
-            RunStore(options.store),
-            workers=options.workers,
-            cells=options.cells,
+        rows.append(
+            judge_labelled(
+                options.folder / name,
+                known[name],
+                RunStore(options.store),
+                workers=options.workers,
+                cells=options.cells,
+            )
         )
-        rows.append(describe(name, found) | {"commit": commit, "date": str(date.today())})
         top = ", ".join(f"{h} {p:.3f}" for h, p in rows[-1]["ranked"][:3])
         print(f"{name}: {top}  ({time.perf_counter() - began:.0f} s)", flush=True)
-        rows[-1] |= compare_gain(found, known[name])
-        rows[-1]["truth"] = {key: value for key, value in known[name].items() if key != "drops"}
         if options.rows:
             with options.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(rows[-1]) + "\n")
@@ -262,7 +275,7 @@ def main() -> None:
     table = score(rows)
     nulls, others = table[table.hidden == "none"], table[~table.hidden.isin(["none", "unknown"])]
     lines = [
-        f"{date.today()}, commit {commit}: {len(table)} campaigns",
+        f"{date.today()}, commit {name_commit()}: {len(table)} campaigns",
         f"none called none {int((nulls['first'] == 'none').sum())} of {len(nulls)}; exact cause first "
         f"{int(others.exact.sum())} of {len(others)}, class {int(others['class'].sum())} of {len(others)}, among those named "
         f"{int(others.named.sum())} of {len(others)}; wrong cause with "

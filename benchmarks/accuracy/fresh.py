@@ -133,6 +133,40 @@ def join(one: dict, other: dict) -> dict:
     return both
 
 
+def draw_plan(
+    seed: int, *, nulls: int, listed: int, pairs: int, unlisted: int, letter: str = "n"
+) -> list[dict]:
+    """What is hidden in each campaign, with all that a plan says of it."""
+    rng, effects = np.random.default_rng(seed), list_effects(None)
+
+    def deal(names: list[str], count: int) -> list[str]:
+        """Each as often as the others, in random order."""
+        order = cycle(rng.permutation(names))
+        return [str(next(order)) for _ in range(count)]
+
+    causes: list[dict] = [{"cause": "none"} for _ in range(nulls)]
+    for name in deal(list(LISTED), listed):
+        causes.append({"cause": name, **draw_listed(effects[name], rng)})
+    for _ in range(pairs):
+        pair = sorted(map(str, rng.choice(list(LISTED), 2, replace=False)))
+        causes.append(
+            {"cause": " + ".join(pair), **join(*(draw_listed(effects[name], rng) for name in pair))}
+        )
+    for kind in deal(list(KINDS), unlisted):
+        causes.append({"cause": "unknown", "note": kind, **KINDS[kind](rng)})
+    plan = []
+    for k, each in enumerate(causes[i] for i in rng.permutation(len(causes))):
+        drawn = {
+            "pm": round(between(rng, *P_M), -1),
+            "seed": int(rng.integers(2**31)),
+            "scatter": between(rng, *SCATTER),
+            "noise_slope": float(rng.uniform(-NOISE_SLOPE, NOISE_SLOPE)),
+            "scans": bool(rng.uniform() < 0.5) or any(name in each["cause"] for name in NEED_SCANS),
+        }
+        plan.append({"name": f"{letter}{k + 1:03d}", **each, **drawn})
+    return plan
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -142,32 +176,10 @@ def main() -> None:
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--letter", default="n")
     asked = parser.parse_args()
-    rng, effects = np.random.default_rng(asked.seed), list_effects(None)
-
-    def deal(names: list[str], count: int) -> list[str]:
-        """Each as often as the others, in random order."""
-        order = cycle(rng.permutation(names))
-        return [str(next(order)) for _ in range(count)]
-
-    plan: list[dict] = [{"cause": "none"} for _ in range(asked.nulls)]
-    for name in deal(list(LISTED), asked.listed):
-        plan.append({"cause": name, **draw_listed(effects[name], rng)})
-    for _ in range(asked.pairs):
-        pair = sorted(map(str, rng.choice(list(LISTED), 2, replace=False)))
-        plan.append({"cause": " + ".join(pair), **join(*(draw_listed(effects[name], rng) for name in pair))})
-    for kind in deal(list(KINDS), asked.unlisted):
-        plan.append({"cause": "unknown", "note": kind, **KINDS[kind](rng)})
     print(f"# benchmarks/accuracy/fresh.py --seed {asked.seed}")
-    for k, each in enumerate(plan[i] for i in rng.permutation(len(plan))):
-        drawn = {
-            "pm": round(between(rng, *P_M), -1),
-            "seed": int(rng.integers(2**31)),
-            "scatter": between(rng, *SCATTER),
-            "noise_slope": float(rng.uniform(-NOISE_SLOPE, NOISE_SLOPE)),
-            "scans": bool(rng.uniform() < 0.5) or any(name in each["cause"] for name in NEED_SCANS),
-        }
-        print(f'\n[[campaign]]\nname = "{asked.letter}{k + 1:03d}"')
-        print("\n".join(f"{key} = {format_toml(value)}" for key, value in {**each, **drawn}.items()))
+    for each in draw_plan(**vars(asked)):
+        print("\n[[campaign]]")
+        print("\n".join(f"{key} = {format_toml(value)}" for key, value in each.items()))
 
 
 if __name__ == "__main__":

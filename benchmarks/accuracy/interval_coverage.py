@@ -9,23 +9,77 @@ and a p_m of its own. Writes OUT/rows.jsonl, one line a campaign; a second call 
 from __future__ import annotations
 
 import argparse
+import json
 import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import beta
 
-from benchmarks.accuracy.own_campaigns import append_rows, interval, open_campaign, read_rows
 from benchmarks.truths.measured import LABORATORY, measure_hidden
 from benchmarks.truths.table import Hidden, TruthTable
+from labsim.campaign import read_campaign, read_scan
+from labsim.ct.reduce import ReducedScan, reduce_scan
 from labsim.inference.calibrate import prepare, sample_fit
 from labsim.inference.fits.fitting import fit_p_value
 from labsim.inference.scatter import allow_scatter
-from labsim.records import Campaign
+from labsim.records import Campaign, GreyCalibration, Measured, Projectile, Scan
 from labsim.runs.store import RunStore
 
+CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
+LABELLED_SCANS = CAMPAIGN.parents[1] / "ct" / "labelled_scans"
+SCANS = [LABELLED_SCANS / name for name in ("p01-C01", "p05-C02")]  # frames, masks and errors of maps
+# rods of 0.5 mm and of 1.5 mm radius, slow to fast
+STANDARD = "D01,D02,D03,D05,D06,D07,D11,D13,D14"
+VOXEL = 40e-6  # m
 SPREAD = 0.15  # of ln p_m about 1300 Pa, inside the truth's own nodes
+
+
+def open_campaign(drops: str, maps: bool) -> tuple[Campaign, list[ReducedScan]]:
+    """The campaign whose drops are filmed again, and the reduced scans whose frames its maps take."""
+    campaign = read_campaign(CAMPAIGN)
+    chosen = [drop for drop in campaign.drops if not drops or drop.name in drops.split(",")]
+    if maps:
+        scans = [replace(read_scan(path), name=f"C{k:02d}") for k, path in enumerate(SCANS, start=1)]
+        reduced = [reduce_scan(scan, sample_filling_factor=campaign.sample.filling_factor) for scan in scans]
+        return replace(campaign, drops=tuple(chosen), scans=tuple(scans)), reduced
+    projectile = chosen[0].projectile
+    bead = Projectile("sphere", projectile.tip_radius, projectile.mass)
+    grey = GreyCalibration(12.0, 0.16, campaign.sample.monomer_density)
+    scan = Scan(
+        "C01", bead, Measured(0.8, 0.04), Path(), VOXEL, "top", 8, grey
+    )  # only its undisturbed dust is made
+    return replace(campaign, drops=tuple(chosen), scans=(scan, replace(scan, name="C02"))), []
+
+
+def read_rows(log: Path) -> list[dict]:
+    """What earlier calls have written, one line a campaign."""
+    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def append_rows(
+    log: Path, judge: Callable[[Any], dict], jobs: Sequence, workers: int, say: Callable[[dict], str]
+) -> None:
+    """Judge the jobs side by side; every row is written as it comes, so that a second call goes on."""
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool, log.open("a") as file:
+        for number, row in enumerate(pool.map(judge, jobs), start=1):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(f"{number}/{len(jobs)}{say(row)}", flush=True)
+
+
+def interval(hits: pd.Series) -> str:
+    """Share of True with its Clopper-Pearson interval, 95 %."""
+    of, yes = len(hits), int(hits.sum())
+    low = beta.ppf(0.025, yes, of - yes + 1) if yes else 0.0
+    high = beta.ppf(0.975, yes + 1, of - yes) if yes < of else 1.0
+    return f"{yes}/{of} = {yes / max(of, 1):.2f} [{low:.2f}, {high:.2f}]"
 
 
 def calibrate_hidden(job: tuple[Campaign, Path | None, TruthTable, int, float]) -> dict:

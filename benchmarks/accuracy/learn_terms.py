@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.own_campaigns import STANDARD, open_campaign
+from benchmarks.accuracy.interval_coverage import STANDARD, open_campaign
 from benchmarks.truths.measured import LABORATORY, Hidden, TruthTable, measure_hidden
 from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.effects.law_places import LAW_PLACES

@@ -250,4 +250,5 @@ def _plan_film(problem: Problem, name: str, projectile: Projectile, stop: float)
     )
     time = stop * np.concatenate([np.linspace(-1.0, -0.05, FALL), np.linspace(0.03, END, DUST)])
     share = max(camera.frame_rate * stop * END / DUST, 1.0)  # frames that one row stands for
-    return FilmedDrop(drop, time, np.zeros(time.size), sigma / math.sqrt(share))
+    sigma /= math.sqrt(share)
+    return FilmedDrop(drop, time, np.zeros(time.size), sigma, sigma)

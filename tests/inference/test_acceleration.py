@@ -48,7 +48,7 @@ def test_p_m_lies_in_its_interval(tmp_path: Path, p_m: float, noise: float, scal
 
 
 def test_an_accelerometer_stands_beside_cameras(tmp_path: Path) -> None:
-    """Three drops of each: both are compared, the interval holds the truth, a spoilt scale of the sensor shows as a misfit."""
+    """Three drops of each: both are compared, the interval holds the truth, a spoilt scale of the sensor shows."""
     felt = accelerations.write_campaign(tmp_path / "felt", scale=1.35)
     seen = laws.write_campaign(tmp_path / "c")
     for name in ("D01", "D03", "D05"):
@@ -62,7 +62,9 @@ def test_an_accelerometer_stands_beside_cameras(tmp_path: Path) -> None:
     kinds = [isinstance(model, AccelerationModel) for model in sound.problem.tracks.models]
     assert kinds == [True, False] * 3
     assert low < 1300.0 < high and sound.p_value > 0.05
-    assert spoilt.fit.chi_square > sound.fit.chi_square + 7.0**2
+    # by itself it may be dust that differs by as much, which is what is said
+    assert spoilt.problem.budget.scatter > 0.1 and sound.problem.budget.scatter == 0.02
+    assert "scatters by" in spoilt.warnings[0] and spoilt.fit.evidence < sound.fit.evidence - 5.0
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])
@@ -155,11 +157,11 @@ def test_the_likelihood_has_no_jump_as_contact_moves(tmp_path: Path) -> None:
     """Over three stretches, in steps of a hundredth: χ² and ln det C of a drop, with the errors that begin at contact."""
     folder = accelerations.write_campaign(tmp_path / "c", drops=[(1.0, 12.0, 0.7)])
     problem, fit_ = prepare(read_campaign(folder), laws.LawStore(tmp_path / "store"), workers=1)
-    (own,) = (nuisances for nuisances in fit_.nuisances if nuisances.shape == (1, 3))
+    (own,) = (nuisances for nuisances in fit_.nuisances if nuisances.shape == (1, 4))
     stretch = float(np.median(np.diff(problem.tracks.models[0].observed.end)))
     seen = []
     for shift in np.arange(-150, 151) * 0.01 * stretch:
-        moved = own + np.array([[shift, 0.0, 0.0]])
+        moved = own + np.array([[shift, 0.0, 0.0, 0.0]])
         (block,) = linearise_at(problem, (moved,), fit_.log_p_m, {})
         seen.append(block.chi_square + block.log_determinant)
     assert np.abs(np.diff(seen)).max() < 0.5
@@ -225,8 +227,12 @@ def test_a_law_without_a_name_is_a_share_of_what_is_expected_not_of_what_is_reco
     reached = law_coordinates(problem, fit_)["reached"]
     for model, instant in zip(problem.tracks.models, problem.tracks.instants(fit_.nuisances[0]), strict=True):
         assert isinstance(model, AccelerationModel)
-        features = model.table.features(fit_.log_p_m, instant.log_speed, {})
-        here = np.where(model.below, np.maximum(model.predict(features, Instrument(), instant), 0.0), 0.0)
+        there, further = (
+            model.predict(model.table.features(log_p_m, instant.log_speed, {}), Instrument(), instant)
+            for log_p_m in (fit_.log_p_m + instant.strength, fit_.log_p_m + instant.strength + 1e-2)
+        )
+        expected = there - instant.strength * (further - there) / 1e-2  # of a sample like the others
+        here = np.where(model.below, np.maximum(expected, 0.0), 0.0)
         start = fit_.drops.sections[model.observed.name].start
         assert reached[start : start + here.size] == pytest.approx(here, abs=1e-6 * here.max())
     assert fit_unknown(problem, fit_).evidence < fit_.evidence

@@ -16,7 +16,7 @@ from labsim.inference.emulation.grid import (
     smooth_weights,
     strength_node,
 )
-from labsim.inference.emulation.nodes import amplitude_nodes, nodes_around
+from labsim.inference.emulation.nodes import amplitude_nodes, hold_known, nodes_around
 from labsim.inference.problem import Problem
 
 
@@ -179,3 +179,20 @@ def test_a_step_that_doubles_a_strength_is_not_made_longer():
     eta = list_effects(None)["strength_rate"].amplitudes[0]
     assert eta.stretch(4.0) == eta
     assert FACTOR.stretch(2.0).step == pytest.approx(1.5**2 - 1.0)
+
+
+@pytest.mark.parametrize("name", ["shear_strength", "pore_gas", "surface_crust", "strength_rate"])
+@pytest.mark.parametrize("sparse", [False, True])
+def test_no_amplitude_lies_beyond_the_largest_that_runs_are_made_of(name, sparse):
+    effect = list_effects(None)[name]
+    parameter = effect.amplitudes[0]
+    unit = abs(parameter.grade(parameter.step))
+    for asked in (1e9, -1e9, 40 * parameter.step, -40 * parameter.step, 0.4 * parameter.step):
+        held = hold_known(effect, asked, sparse=sparse)
+        assert parameter.hold(held) == pytest.approx(parameter.null + held)
+        assert abs(parameter.grade(held)) <= (8 if sparse else 12) * unit * (1 + 1e-12)
+        # the farthest node lies at it or beyond
+        nodes = [abs(parameter.grade(each)) for each in amplitude_nodes(effect, held, sparse=sparse)]
+        assert max(nodes) >= abs(parameter.grade(held)) * (1 - 1e-9)
+        if asked == 0.4 * parameter.step:
+            assert held == pytest.approx(asked)

@@ -1,4 +1,4 @@
-"""The noise of a drop's rows is judged where its depth is measured, not on its free fall."""
+"""The noise of a drop's rows is judged in the dust, where its depth is measured, and in free fall, each by itself."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from labsim.campaign import read_campaign
+from labsim.inference.emulation.forward import ResponseTable
+from labsim.inference.observations.drop_model import make_drop_model
 from labsim.inference.observations.observe import (
     ObservedDrop,
     join_alike,
@@ -26,27 +28,44 @@ def plain() -> list[ObservedDrop]:
     return [observe_drop(drop, read_observed_track(drop)) for drop in drops]
 
 
-def spoil(drop: ObservedDrop, factor: float, rng: np.random.Generator) -> ObservedDrop:
-    """The drop with what its motion leaves of the rows drawn anew: ``factor`` times the stated noise from contact on."""
+def spoil(drop: ObservedDrop, factor: float, rng: np.random.Generator, flying: float = 1.0) -> ObservedDrop:
+    """The drop with what its motion leaves of the rows drawn anew: ``factor`` times the stated noise from contact on, ``flying``
+    times it before."""
     curve = drop.curve
     assert curve.residual is not None and curve.clock is not None
-    sigma = np.where(curve.clock > drop.contact_time, factor, 1.0) * np.median(drop.track.sigma)
+    sigma = np.where(curve.clock > drop.contact_time, factor, flying) * np.median(drop.track.sigma)
     drawn = np.where(np.isfinite(curve.residual), sigma * rng.standard_normal(sigma.size), np.nan)
     return replace(drop, curve=replace(curve, residual=drawn))
 
 
-def compare(seen: list[ObservedDrop]) -> list[float]:
+def compare(seen: list[ObservedDrop], where: str = "sigma") -> list[float]:
     """Judged over stated noise."""
-    return [after.sigma / before.sigma for before, after in zip(seen, judge_noise(seen), strict=True)]
+    pairs = zip(seen, judge_noise(seen), strict=True)
+    return [getattr(after, where) / getattr(before, where) for before, after in pairs]
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.4])
 def test_noise_that_grows_or_falls_along_the_films_is_found(plain, factor):
     rng = np.random.default_rng(4)
-    ratios = [ratio for _ in range(20) for ratio in compare([spoil(drop, factor, rng) for drop in plain])]
-    # the stated noise counts too, and three degrees of freedom that no motion took from these rows
-    assert np.mean(ratios) == pytest.approx(factor, rel=0.12)
-    assert np.std(ratios) < 0.12 * factor
+    flying = 2.0 - factor
+    spoiled = [[spoil(drop, factor, rng, flying) for drop in plain] for _ in range(20)]
+    for where, true in (("sigma", factor), ("flight_sigma", flying)):
+        ratios = [ratio for each in spoiled for ratio in compare(each, where)]
+        # the stated noise counts too, and degrees of freedom that no motion took from these rows
+        assert np.mean(ratios) == pytest.approx(true, rel=0.12)
+        assert np.std(ratios) < 0.12 * true
+
+
+def test_rows_of_free_fall_count_by_its_own_noise(plain):
+    """Films whose light gets better as they go on: rows above the dust taken for as good as those in it would be a misfit."""
+    (drop,) = judge_noise([spoil(plain[0], 0.7, np.random.default_rng(7), 1.5)])
+    model = make_drop_model(drop, ResponseTable(np.zeros(1), (0,)))
+    frames = 1.0 / np.sum(model.matrix**2, axis=1)
+    flying = model.data < -drop.pixel
+    assert flying.any() and model.below.any()
+    assert model.data_variance[flying] * frames[flying] == pytest.approx(drop.flight_sigma**2)
+    assert model.data_variance[model.below] == pytest.approx(drop.sigma**2)
+    assert drop.flight_sigma > 1.3 * drop.sigma
 
 
 def test_one_noisy_film_does_not_spoil_the_others(plain):

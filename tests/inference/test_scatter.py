@@ -11,8 +11,10 @@ from scipy.integrate import quad
 from scipy.stats import halfnorm
 
 from labsim.campaign import read_campaign
+from labsim.effects import Instrument
 from labsim.inference.calibrate import prepare
-from labsim.inference.fits.fitting import fit_p_value
+from labsim.inference.emulation.forward import predict_depth
+from labsim.inference.fits.fitting import fit_hypothesis, fit_p_value
 from labsim.inference.measure import measure
 from labsim.inference.scatter import (
     WIDTH,
@@ -42,10 +44,10 @@ def set_residuals(scatter: float, seed: int, used: float = 0.02):
     drops = SimpleNamespace(
         tangents={"ln_p_m": tangent}, covariance=covariance, sections=sections, residual=residual
     )
-    campaign = SimpleNamespace(sample=SimpleNamespace(scatter=None))
+    campaign = SimpleNamespace(sample=SimpleNamespace(scatter=None), p_m_range=(300.0, 6000.0))
     tracks = SimpleNamespace(samples={name: [name] for name in sections})
     problem = SimpleNamespace(budget=SimpleNamespace(scatter=used), campaign=campaign, tracks=tracks)
-    return problem, SimpleNamespace(drops=drops)
+    return problem, SimpleNamespace(drops=drops, log_p_m=math.log(1300.0))
 
 
 @pytest.mark.parametrize(("scatter", "least"), [(0.02, 0), (0.06, 95), (0.10, 100)])
@@ -131,3 +133,32 @@ def test_a_stated_scatter_is_taken(one_rod):
     problem, fit = one_rod(OFFSETS, stated=0.08)
     assert problem.budget.scatter == 0.08
     assert allow_scatter(problem, fit)[1:] == (fit, None)
+
+
+def test_a_sample_far_from_the_others_is_met_at_its_own_strength(one_rod):
+    """A depth is no straight line in ln p_m: by tangents at the common one dust a third weaker would be ten standard deviations
+    off at the stop, and p_m and causes would be moved to meet it."""
+    problem, fit = one_rod(0 * OFFSETS, stated=0.1)
+    tracks = problem.tracks
+    models = list(tracks.models)
+    place = max(range(len(models)), key=lambda k: models[k].deepest)
+    model, instant = models[place], tracks.instants(fit.nuisances[0])[place]
+    own = fit.log_p_m - 0.4
+    features = model.table.features(own, instant.log_speed, {})
+    depth = predict_depth(features, model.observed.time, instant, Instrument(), 0.0)
+    models[place] = replace(model, observed=replace(model.observed, depth=depth))
+    other = replace(problem, observations=(replace(tracks, models=tuple(models)), *problem.observations[1:]))
+    again = fit_hypothesis(other, (), (fit.log_p_m, {}), nuisances=fit)
+    strength = other.tracks.instants(again.nuisances[0])[place].strength
+    assert again.log_p_m + strength == pytest.approx(own, abs=0.05)
+    section = again.drops.sections[model.observed.name]
+    left = again.drops.residual[section]
+    square = left @ np.linalg.solve(again.drops.covariance[section, section], left)
+    assert square < (strength / 0.1) ** 2 + 3.0  # what its own prior costs
+
+
+def test_what_a_range_keeps_from_p_m_is_no_scatter() -> None:
+    problem, fit = set_residuals(0.1, 0)
+    assert find_larger(weigh_least(0.02), problem, fit) is not None
+    stopped = SimpleNamespace(drops=fit.drops, log_p_m=math.log(problem.campaign.p_m_range[0]))
+    assert find_larger(weigh_least(0.02), problem, stopped) is None

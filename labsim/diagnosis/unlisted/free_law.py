@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ...effects import Effect
 from ...inference.emulation.grid import Request
-from ...inference.emulation.nodes import SPARSE_LADDER, amplitude_nodes, place_strength
+from ...inference.emulation.nodes import amplitude_nodes, hold_known, place_strength
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import cut_gaussian
 from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_p_value
@@ -169,7 +168,7 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
         # the others' best where p_m stops short of its own
         step += covariance[0] / covariance[0, 0] * (log_p_m - before - step[0])
         best = {
-            name: hold_hat(hats[name], values[name] + float(part))
+            name: hold_known(hats[name], values[name] + float(part), sparse=True)
             for name, part in zip(own, step[1:], strict=True)
         }
         values = dict.fromkeys(names, 0.0) | best
@@ -184,13 +183,6 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
         free.require_changes(nodes, "free law, large", rough=True)
         nuisances, _ = move_nuisances(problem, nuisances, blocks, weighted)
     return found
-
-
-def hold_hat(hat: Effect, amplitude: float) -> float:
-    """An amplitude kept within what runs know: about a p_m that has run away a linear model asks for anything."""
-    parameter = hat.amplitudes[0]
-    farthest = SPARSE_LADDER[-1] * parameter.step
-    return parameter.hold(min(max(amplitude, -farthest), farthest))
 
 
 def choose_hats(found: Tangents, freedom: str) -> list[str]:

@@ -18,7 +18,7 @@ from ...effects import Instrument, Parameter
 from ...errors import ExtrapolationError
 from ...records import STANDARD_GRAVITY, FloatArray
 from .curves import interpolate_depth, interpolate_rate
-from .grid import STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
+from .grid import SPEED_RATIO, STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
 
 EXPOSED = 8  # times that an instant is put right by the tip's depth: each leaves speed times delay of the last change
 
@@ -50,11 +50,14 @@ class ResponseTable:
         return self.at(log_p_m, log_speed).features(amplitudes)
 
     def at(self, log_p_m: float, log_speed: float) -> Response:
-        """What the runs say at one strength and speed. Raises ExtrapolationError where no run says anything."""
+        """What the runs say at one strength and speed, as at half a node beyond them where a fit that leads nowhere asks for a
+        speed farther off. Raises ExtrapolationError where no run says anything."""
         if not self.base:
             raise ExtrapolationError(
                 "simulation", "runs", "every run of one projectile failed; see labsim runs"
             )
+        beyond = 0.5 * math.log(SPEED_RATIO)
+        log_speed = min(max(log_speed, self.log_speeds[0] - beyond), self.log_speeds[-1] + beyond)
         across = interpolation_weights(self.log_speeds, log_speed)
         weights = smooth_weights(_log_strengths(self.base), log_p_m)
         plain = np.outer(weights, across).ravel() @ self.stack(self.base)
@@ -134,6 +137,7 @@ class Instant(NamedTuple):
     contact_time: float
     log_speed: float
     surface: float
+    strength: float = 0.0
 
 
 def predict_depth(

@@ -7,7 +7,8 @@ import math
 from ...effects import Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
-SPARSE_LADDER = (1.0, 3.0, 8.0)  # steps of an effect, of which few runs are made
+LADDER = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # steps of an effect that runs are made of
+SPARSE_LADDER = (1.0, 3.0, 8.0)  # the same where they are few
 
 
 def place_strength(log_p_m: float) -> float:
@@ -53,6 +54,15 @@ def screening_node(log_p_m: float) -> int:
     return 2 * round(0.5 * place_strength(log_p_m))
 
 
+def hold_known(effect: Effect, amplitude: float, *, sparse: bool = False) -> float:
+    """An amplitude kept within the largest that runs are made of: about a p_m that has run away tangents ask for anything."""
+    parameter = effect.amplitudes[0]
+    most = (SPARSE_LADDER if sparse else LADDER)[-1] * abs(parameter.grade(parameter.step))
+    inside = parameter.hold(amplitude) - parameter.null
+    grade = parameter.grade(inside)
+    return parameter.amplitude_at(math.copysign(most, grade)) if abs(grade) > most else inside
+
+
 def amplitude_nodes(
     effect: Effect,
     amplitude: float,
@@ -77,7 +87,7 @@ def amplitude_nodes(
     if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
         wanted = [sign]
     else:
-        ladder = SPARSE_LADDER if sparse else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
+        ladder = SPARSE_LADDER if sparse else LADDER
         if bent:
             ladder = tuple(sorted({0.5, *ladder} if sparse else {0.25, 0.5, 0.75, 1.5, *ladder}))
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]

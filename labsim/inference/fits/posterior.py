@@ -86,14 +86,10 @@ def measure_residual(
     residual: Callable[[FloatArray], FloatArray],
     centre: FloatArray,
     covariance: FloatArray,
-    *,
-    straight: bool = False,
 ) -> QuadraticResidual:
     """Quadratic through the centre, both sides of each principal axis of the covariance and one corner of each pair.
 
     Along the axes of parameters that make up for each other the ends would lie far from all that the data allow.
-    straight : its linear part alone, as Laplace's formula has it. Where a prior's end stops a fit, chains run along that end
-    far from where the residual is small, and a parabola would turn round there.
     """
     sigma = np.sqrt(np.diag(covariance))
     widths, directions = np.linalg.eigh(covariance / np.outer(sigma, sigma))
@@ -112,8 +108,6 @@ def measure_residual(
     grid = np.array(u)
     values = np.array([residual(centre + axes @ row) for row in grid])
     coefficients = np.linalg.lstsq(_terms(grid), values, rcond=None)[0]
-    if straight:
-        coefficients[1 + d :] = 0.0
     return QuadraticResidual(centre, axes, coefficients)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...records import FloatArray
+from ..emulation.nodes import hold_known
 from ..problem import Problem
 from .blocks import Block, solve_globals
 from .tangents import Blocks, linearise_at
@@ -130,10 +131,10 @@ def stop_at_limits(problem: Problem, here: Solved) -> tuple[FloatArray, set[int]
         stopped.add(0)
     for k, (name, value) in enumerate(here.place.values.items(), start=1):
         parameter = problem.effects[name].amplitudes[0]
-        low, high = parameter.limits
-        if not low <= parameter.null + value + step[k] <= high:
-            back = hold(problem, name, value + float(step[k])) - value - step[k]
-            step = step + here.covariance[k] / here.covariance[k, k] * back
+        wanted = value + float(step[k])
+        held = hold(problem, name, wanted)
+        if not math.isclose(held, wanted, rel_tol=1e-9, abs_tol=1e-9 * abs(parameter.step)):
+            step = step + here.covariance[k] / here.covariance[k, k] * (held - wanted)
             stopped.add(k)
     return step, stopped
 
@@ -145,9 +146,11 @@ def hold_strength(problem: Problem, log_p_m: float) -> float:
 
 
 def hold(problem: Problem, name: str, amplitude: float) -> float:
-    """An amplitude, inside the limits of its parameter."""
-    parameter = problem.effects[name].amplitudes[0]
-    return parameter.hold(amplitude) - parameter.null
+    """An amplitude, inside the limits of its parameter and within what runs are made of."""
+    effect = problem.effects[name]
+    if problem.affects_simulation(name):
+        return hold_known(effect, amplitude)
+    return effect.amplitudes[0].hold(amplitude) - effect.amplitudes[0].null
 
 
 def _shorten(problem: Problem, step: FloatArray, values: Mapping[str, float]) -> FloatArray:

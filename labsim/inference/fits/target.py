@@ -75,14 +75,15 @@ def make_target(problem: Problem, fit: Fit) -> Target:
     nulls = tuple(parameter.null for parameter in parameters)
     at_end = any(math.isclose(fit.log_p_m, end, abs_tol=1e-9) for end in bounds[0])
     # accelerations of runs at two p_m differ by the noise of their particles too, which a secant takes for what p_m changes and
-    # the solver's error of p_m, which lies along the tangent at the fit, does not cover
-    if any(isinstance(model, AccelerationModel) for model in problem.tracks.models):
+    # the solver's error of p_m, which lies along the tangent at the fit, does not cover. And where a prior's end stops a fit,
+    # chains run along that end far from where the residual is small, and a parabola would turn round there
+    if at_end or any(isinstance(model, AccelerationModel) for model in problem.tracks.models):
         white = whiten_all(fit.blocks, ["ln_p_m", *fit.hypothesis])
         misfit = measure_residual(
             lambda theta: white[:, 0] - white[:, 1:] @ (theta - centre), centre, fit.covariance
         )
     else:
-        misfit = measure_residual(miss, centre, fit.covariance, straight=at_end)
+        misfit = measure_residual(miss, centre, fit.covariance)
     return Target(names, nulls, parameters, misfit, np.array(bounds))
 
 

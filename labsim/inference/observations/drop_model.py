@@ -65,7 +65,9 @@ class DropModel:
 
     @property
     def data_variance(self) -> FloatArray:
-        return np.asarray(self.observed.sigma**2 * np.sum(self.matrix**2, axis=1))
+        flying = self.observed.time < self.start.contact_time
+        variance = np.where(flying, self.observed.flight_sigma**2, self.observed.sigma**2)
+        return np.asarray(self.matrix**2 @ variance)
 
     @property
     def below(self) -> np.ndarray:

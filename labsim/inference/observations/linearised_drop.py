@@ -82,7 +82,7 @@ class NumericalError:
 class LinearisedDrop:
     """One drop about one point. residual, white (variance) : (n,); local : (n, nuisances) scaled by their prior widths;
     pull : (nuisances,) current nuisances over prior widths; tangents : name -> (n,); shared : name -> (n,), errors with one
-    value for several drops."""
+    value for several drops; scatter : prior width of its own ln p_m, the fourth nuisance, 0 where that is shared."""
 
     residual: Float[np.ndarray, " n"]
     white: Float[np.ndarray, " n"]
@@ -91,6 +91,7 @@ class LinearisedDrop:
     tangents: Mapping[str, Float[np.ndarray, " n"]]
     shared: Mapping[str, Float[np.ndarray, " n"]]
     numerical: NumericalError
+    scatter: float
 
 
 def measure_distances(drops: Sequence[tuple[float, float, float]]) -> FloatArray:
@@ -116,7 +117,7 @@ def linearise_drop(
     observed = model.observed
     name, n = observed.name, model.data.size
     instrument = nominal.instruments[name]
-    lp = log_p_m + nominal.log_offsets.get(name, 0.0)
+    lp = log_p_m + nominal.log_offsets.get(name, 0.0) + instant.strength
     response = model.table.at(lp, instant.log_speed)
     features = response.features(nominal.amplitudes)
     here = model.predict(features, instrument, instant)
@@ -129,7 +130,7 @@ def linearise_drop(
 
     tangents = {"ln_p_m": by_strength}
     for perturbation, point in perturbations.items():
-        there = log_p_m + point.log_offsets.get(name, 0.0)
+        there = log_p_m + point.log_offsets.get(name, 0.0) + instant.strength
         at = response if there == lp else model.table.at(there, instant.log_speed)
         moved = at.features(point.amplitudes)
         if np.array_equal(moved, features) and point.instruments[name] == instrument:
@@ -141,8 +142,8 @@ def linearise_drop(
 
     mass = observed.drop.projectile
     scatter = math.hypot(budget.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
-    own_errors = model.own_errors
-    own_strength = by_strength * max(scatter, LEAST_SCATTER)
+    scatter = max(scatter, LEAST_SCATTER)
+    own_errors, own_strength = model.own_errors, by_strength * scatter
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
         columns.append(own_strength)
@@ -150,6 +151,8 @@ def linearise_drop(
     local = np.column_stack([*columns, own_errors[:, 1:]])
     pull = np.zeros(local.shape[1])
     pull[2] = instant.surface / model.surface_sigma
+    if not with_others:
+        pull[3] = instant.strength / scatter
 
     def differ(factor: str) -> FloatArray:
         changed = instrument.replace(**{factor: getattr(instrument, factor) * 1.001})
@@ -195,6 +198,7 @@ def linearise_drop(
         tangents,
         shared,
         numerical,
+        0.0 if with_others else scatter,
     )
     if budget.heights:
         for expected, sigma in list_speeds(model):
@@ -235,4 +239,5 @@ def _add_speed(drop: LinearisedDrop, left: float, sigma: float) -> LinearisedDro
         pad(drop.tangents),
         pad(drop.shared),
         replace(numerical, size=np.append(numerical.size, 0.0), fraction=np.append(numerical.fraction, 0.0)),
+        drop.scatter,
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
@@ -26,7 +26,8 @@ from .observe_push import ObservedPush, observe_push
 
 MARGIN = 4  # frames kept after the depth has stopped growing
 ASTRAY = 3.0  # times the scatter of the middle film, from which on a film says nothing of the others
-DUST_PARAMETERS = 3  # that the rows in the dust tell of a motion; contact and speed are those of free fall
+FLIGHT_PARAMETERS = 2  # that free fall tells of a motion: contact and speed
+DUST_PARAMETERS = 3  # that the rows in the dust tell of it besides
 NUMBER = re.compile(r"(?:(?<=[\s(])-)?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NAMES_FRAMES = re.compile(r"frames? \d")
 MOST_NAMED = 6  # drops of which the same is said
@@ -36,12 +37,14 @@ SAID_ELSEWHERE = ("left out (frame", "no position", "free flight falls")
 
 @dataclass(frozen=True)
 class FilmedDrop:
-    """One drop on the stated scales. time, depth : (n,) s, m; depth is positive below the stated surface; sigma : m."""
+    """One drop on the stated scales. time, depth : (n,) s, m; depth is positive below the stated surface; sigma : m, of a depth
+    in the dust; flight_sigma : m, above it."""
 
     drop: Drop
     time: FloatArray
     depth: FloatArray
     sigma: float
+    flight_sigma: float
 
     @property
     def name(self) -> str:
@@ -112,6 +115,7 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
         time=time[:last],
         depth=depth[:last],
         sigma=sigma_px * pixel,
+        flight_sigma=sigma_px * pixel,
         rejected=int(np.sum(good & ~curve.used & (curve.clock <= time[-1]))),
         track=track,
         curve=curve,
@@ -119,32 +123,45 @@ def observe_drop(drop: Drop, track: Track) -> ObservedDrop:
 
 
 def judge_noise(seen: Sequence[Observed]) -> list[Observed]:
-    """The drops with the noise that their rows have in the dust, where the stated one is that of all frames at best: light and
-    focus change along a film. The stated error bars count as NOISE_KNOWN frames against all films, these as much against one.
-    A film that scatters beyond the middle one by more than ASTRAY says nothing of the others: its motion was not found.
+    """The drops with the noise that their rows have in free fall and in the dust, each by itself: light and focus change along a
+    film. The stated one is that of all frames at best. Its error bars count as NOISE_KNOWN frames against all films, these as
+    much against one. A film that scatters beyond the middle one by more than ASTRAY says nothing of the others: its motion was
+    not found.
     """
-    scatter = {each.name: _scatter_in_dust(each) for each in seen if isinstance(each, ObservedDrop)}
-    shown = [(square + NOISE_KNOWN) / (free + NOISE_KNOWN) for square, free in scatter.values()]
-    most = ASTRAY**2 * float(np.median(shown or 1.0))
-    alike = [one for one, each in zip(scatter.values(), shown, strict=True) if each <= most]
-    squares, freedom = np.sum([*alike, (0.0, 0)], axis=0)
-    common = (squares + NOISE_KNOWN) / (freedom + NOISE_KNOWN)
-    own = {n: (square + NOISE_KNOWN * common) / (free + NOISE_KNOWN) for n, (square, free) in scatter.items()}
+    films = {each.name: each for each in seen if isinstance(each, ObservedDrop)}
+    dust = _compare_noise({name: _scatter(each, in_dust=True) for name, each in films.items()})
+    flight = _compare_noise({name: _scatter(each, in_dust=False) for name, each in films.items()})
     return [
-        replace(each, sigma=each.sigma * math.sqrt(own[each.name]))
+        replace(each, sigma=each.sigma * dust[each.name], flight_sigma=each.flight_sigma * flight[each.name])
         if isinstance(each, ObservedDrop)
         else each
         for each in seen
     ]
 
 
-def _scatter_in_dust(drop: ObservedDrop) -> tuple[float, int]:
-    """χ² of the rows between contact and rest about the motion that was fitted to them alone, and its degrees of freedom."""
+def _compare_noise(scatter: Mapping[str, tuple[float, int]]) -> dict[str, float]:
+    """What the stated noise of each film has to be multiplied by. scatter : χ² and its degrees of freedom."""
+    shown = [(square + NOISE_KNOWN) / (free + NOISE_KNOWN) for square, free in scatter.values()]
+    most = ASTRAY**2 * float(np.median(shown or 1.0))
+    alike = [one for one, each in zip(scatter.values(), shown, strict=True) if each <= most]
+    squares, freedom = np.sum([*alike, (0.0, 0)], axis=0)
+    common = (squares + NOISE_KNOWN) / (freedom + NOISE_KNOWN)
+    return {
+        name: math.sqrt((square + NOISE_KNOWN * common) / (free + NOISE_KNOWN))
+        for name, (square, free) in scatter.items()
+    }
+
+
+def _scatter(drop: ObservedDrop, *, in_dust: bool) -> tuple[float, int]:
+    """χ² of the rows in the dust, or of those in free fall, about the motion that was fitted to them alone, and its degrees of
+    freedom."""
     curve, sigma = drop.curve, float(np.median(drop.track.sigma))
     assert curve.used is not None and curve.clock is not None and curve.residual is not None
-    inside = curve.used & (curve.clock > drop.contact_time) & (curve.clock <= drop.time[-1])
+    inside = curve.used & (curve.clock >= drop.time[0]) & (curve.clock <= drop.time[-1])
+    inside &= (curve.clock > drop.contact_time) == in_dust
     left = curve.residual[inside & np.isfinite(curve.residual)]
-    return float(np.sum((left / sigma) ** 2)), max(left.size - DUST_PARAMETERS, 0)
+    own = DUST_PARAMETERS if in_dust else FLIGHT_PARAMETERS
+    return float(np.sum((left / sigma) ** 2)), max(left.size - own, 0)
 
 
 def read_observed_track(drop: Drop) -> Track:

@@ -30,19 +30,24 @@ from .linearised_drop import (
     measure_distances,
 )
 
+MOST_APART = 4.0  # standard deviations that a sample may be from the others
+
 
 @dataclass(frozen=True)
 class DropsBlock(Block):
-    """All drops about one point, each a section. local : per drop, (points, nuisances) scaled by their prior widths."""
+    """All drops about one point, each a section. local : per drop, (points, nuisances) scaled by their prior widths; scatters :
+    of ln p_m of each sample, 0 where other records have it in common."""
 
     local: tuple[FloatArray, ...] = ()
+    scatters: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Tracks:
     """All drops that are compared, an Observation. models : one a drop; features : of one projectile each.
 
-    Nuisances : (drops, 3) contact time (s), ln of the impact speed, offset of the surface row (m).
+    Nuisances : (drops, 4) contact time (s), ln of the impact speed, offset of the surface row (m), of ln p_m of the sample:
+    a drop into dust a quarter weaker than the others is no straight line in ln p_m.
     """
 
     models: tuple[RecordModel, ...]
@@ -99,15 +104,22 @@ class Tracks:
             },
             sections=sections,
             local=tuple(part.local for part in parts),
+            scatters=tuple(part.scatter for part in parts),
         )
 
     def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
         assert isinstance(block, DropsBlock)
         moved, moves = [], [0.0]
-        for model, instant, local in zip(self.models, self.instants(nuisances), block.local, strict=True):
+        for model, instant, local, scatter in zip(
+            self.models, self.instants(nuisances), block.local, block.scatters, strict=True
+        ):
             # in prior widths, about their middles
             best = local.T @ weighted[block.sections[model.observed.name]]
             after, move = model.move(instant, best, WIDTHS)
+            if scatter > 0.0:
+                strength = float(np.clip(best[3], -MOST_APART, MOST_APART)) * scatter
+                after = after._replace(strength=strength)
+                move = max(move, 100 * abs(strength - instant.strength))
             moved.append(after)
             moves.append(move)
         return np.array(moved), max(moves)
