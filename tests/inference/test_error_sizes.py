@@ -62,6 +62,7 @@ def test_the_gain_is_that_of_the_integral_over_sizes(monkeypatch):
         return (Block(residual(log_p_m, amplitude), covariance(problem.budget, amplitude), {}),)
 
     monkeypatch.setattr(error_sizes, "linearise_at", linearise)
+    monkeypatch.setattr(error_sizes, "keep_strengths", lambda problem, fit, log_p_m: ())
     fit = SimpleNamespace(
         hypothesis=("effect",),
         log_p_m=MIDDLE,

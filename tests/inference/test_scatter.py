@@ -14,7 +14,8 @@ from labsim.campaign import read_campaign
 from labsim.effects import Instrument
 from labsim.inference.calibrate import prepare
 from labsim.inference.emulation.forward import predict_depth
-from labsim.inference.fits.fitting import fit_hypothesis, fit_p_value
+from labsim.inference.fits.fitting import fit_hypothesis, fit_p_value, keep_strengths
+from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.measure import measure
 from labsim.inference.scatter import (
     WIDTH,
@@ -162,3 +163,14 @@ def test_what_a_range_keeps_from_p_m_is_no_scatter() -> None:
     assert find_larger(weigh_least(0.02), problem, fit) is not None
     stopped = SimpleNamespace(drops=fit.drops, log_p_m=math.log(problem.campaign.p_m_range[0]))
     assert find_larger(weigh_least(0.02), problem, stopped) is None
+
+
+def test_p_m_in_common_moves_while_each_sample_keeps_its_strength(one_rod):
+    """What a chain is told about p_m beside the fit is what the fit's own covariance says: no drop's curve bends with it."""
+    problem, fit = one_rod(OFFSETS, stated=0.1)
+    assert np.ptp(fit.nuisances[0][:, 3]) > 0.1
+    white = fit.drops.whiten(np.stack([fit.drops.residual, fit.drops.tangents["ln_p_m"]], axis=1))
+    for change in (-0.1, 0.1):
+        there = fit.log_p_m + change
+        block = linearise_at(problem, keep_strengths(problem, fit, there), there, {})[0]
+        assert fit.drops.whiten(block.residual) == pytest.approx(white[:, 0] - change * white[:, 1], abs=1e-6)

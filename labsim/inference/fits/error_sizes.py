@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 from ...records import FloatArray
 from ..problem import Problem
 from .blocks import Block
-from .fitting import Fit
+from .fitting import Fit, keep_strengths
 from .tangents import linearise_at
 from .target import Target
 
@@ -73,7 +73,8 @@ def _integrate_likelihood(problem: Problem, fit: Fit, log_p_m: float, amplitudes
             numerical_change=problem.budget.numerical_change * math.exp(size),
             zone_change=problem.budget.zone_change * math.exp(size),
         )
-        blocks = linearise_at(replace(problem, budget=budget), fit.nuisances, log_p_m, amplitudes)
+        nuisances = keep_strengths(problem, fit, log_p_m)
+        blocks = linearise_at(replace(problem, budget=budget), nuisances, log_p_m, amplitudes)
         drops.append(_log_likelihood(blocks[:1]))
         maps.append(_log_likelihood(blocks[1:]))
     return _over_sizes(drops) + _over_sizes(maps)

@@ -176,6 +176,13 @@ def with_perturbations(
     return linearise_at(problem, fit.nuisances, place, fit.values, names)
 
 
+def keep_strengths(problem: Problem, fit: Fit, log_p_m: float) -> tuple[FloatArray, ...]:
+    """A fit's nuisances at another ln p_m. Its drops show how strong each sample is, whatever p_m they have in common: with their
+    differences from it held instead, curves would bend with p_m in ways that the covariance of the fit does not know."""
+    change = log_p_m - fit.log_p_m
+    return problem.tracks.keep_strengths(fit.nuisances[0], fit.drops, change), *fit.nuisances[1:]
+
+
 def require_runs(problem: Problem, fit: Fit) -> None:
     """Make sure that a problem has the runs that a fit, perhaps to another problem with the same effects, rests on."""
     _ask(problem, fit.hypothesis, fit.log_p_m, fit.values, sparse=False, around=False)

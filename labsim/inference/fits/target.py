@@ -15,7 +15,7 @@ from ...records import FloatArray
 from ..observations.acceleration_model import AccelerationModel
 from ..problem import Problem
 from .blocks import whiten_all
-from .fitting import Fit
+from .fitting import Fit, keep_strengths
 from .posterior import QuadraticResidual, measure_residual
 from .tangents import linearise_at
 
@@ -65,7 +65,7 @@ def make_target(problem: Problem, fit: Fit) -> Target:
 
     def miss(theta: FloatArray) -> FloatArray:
         values = dict(zip(fit.hypothesis, theta[1:], strict=True))
-        blocks = linearise_at(problem, fit.nuisances, float(theta[0]), values)
+        blocks = linearise_at(problem, keep_strengths(problem, fit, float(theta[0])), float(theta[0]), values)
         return np.concatenate(
             [fitted.whiten(block.residual) for fitted, block in zip(fit.blocks, blocks, strict=True)]
         )

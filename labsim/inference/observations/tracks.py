@@ -107,6 +107,13 @@ class Tracks:
             scatters=tuple(part.scatter for part in parts),
         )
 
+    def keep_strengths(self, nuisances: FloatArray, block: Block, change: float) -> FloatArray:
+        """The nuisances where ln p_m is another by ``change`` and each sample keeps the strength that its own drop shows."""
+        assert isinstance(block, DropsBlock)
+        kept = nuisances.copy()
+        kept[:, 3] -= change * (np.array(block.scatters) > 0.0)
+        return kept
+
     def follow(self, nuisances: FloatArray, block: Block, weighted: FloatArray) -> tuple[FloatArray, float]:
         assert isinstance(block, DropsBlock)
         moved, moves = [], [0.0]
