@@ -11,6 +11,7 @@ from labsim.inference.emulation.forward import ResponseTable
 from labsim.inference.emulation.grid import (
     FELT_STEPS,
     SAME_SPEED,
+    enclosing_weights,
     interpolation_weights,
     own_speeds,
     smooth_weights,
@@ -44,6 +45,21 @@ def test_the_curve_has_no_jumps_where_the_nearest_nodes_change():
         for near, x in zip(nearest, at, strict=True)
     ]
     assert np.abs(np.diff(jumping, 2)).max() > 1e-3
+
+
+def test_runs_farther_off_change_nothing_between_the_enclosing_nodes():
+    near, far = [0.0, 1.0, -1.0, 2.0], [0.0, 3.0, 1.0, -3.0, -1.0, 2.0, -2.0]
+    values = {node: math.exp(-0.3 * node) + 0.01 * math.sin(5 * node) for node in far}
+
+    def curve(nodes, at):
+        return enclosing_weights(nodes, at) @ [values[node] for node in nodes]
+
+    for at in (0.0, 0.3, 0.99, 1.0):
+        assert curve(near, at) == pytest.approx(curve(far, at), rel=1e-14)
+    for node in far:  # through every node, and no jump where the four are others
+        assert curve(far, node) == pytest.approx(values[node], rel=1e-12)
+        assert curve(far, node - 1e-9) == pytest.approx(curve(far, node + 1e-9), abs=1e-8)
+    assert curve([0.0, 1.0], 0.5) == pytest.approx(0.5 * (values[0.0] + values[1.0]))
 
 
 def test_an_estimate_lies_well_among_the_nodes_around_it():

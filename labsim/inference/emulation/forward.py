@@ -1,7 +1,8 @@
 """What the simulation says a drop's camera should have recorded, for any p_m, speed and amplitudes of effects near the runs.
 
-Features of runs (curves.py) are interpolated in ln v over all speed nodes and in ln p_m over all strength nodes; an effect adds
-the difference its own runs made, a smooth curve in its amplitude that vanishes at null, and one through all its strength nodes.
+Features of runs (curves.py) are interpolated in ln v over all speed nodes and in ln p_m between the nodes that enclose it: all
+hypotheses rest on the same runs there, whichever others were asked for. An effect adds the difference its own runs made, a
+smooth curve in its amplitude that vanishes at null, and one through all its strength nodes.
 """
 
 from __future__ import annotations
@@ -18,7 +19,14 @@ from ...effects import Instrument, Parameter
 from ...errors import ExtrapolationError
 from ...records import STANDARD_GRAVITY, FloatArray
 from .curves import interpolate_depth, interpolate_rate
-from .grid import SPEED_RATIO, STRENGTH_RATIO, interpolation_weights, smooth_weights, strength_node
+from .grid import (
+    SPEED_RATIO,
+    STRENGTH_RATIO,
+    enclosing_weights,
+    interpolation_weights,
+    smooth_weights,
+    strength_node,
+)
 
 EXPOSED = 8  # times that an instant is put right by the tip's depth: each leaves speed times delay of the last change
 
@@ -59,7 +67,7 @@ class ResponseTable:
         beyond = 0.5 * math.log(SPEED_RATIO)
         log_speed = min(max(log_speed, self.log_speeds[0] - beyond), self.log_speeds[-1] + beyond)
         across = interpolation_weights(self.log_speeds, log_speed)
-        weights = smooth_weights(_log_strengths(self.base), log_p_m)
+        weights = enclosing_weights(_log_strengths(self.base), log_p_m)
         plain = np.outer(weights, across).ravel() @ self.stack(self.base)
         return Response(self, log_p_m, log_speed, across, plain)
 

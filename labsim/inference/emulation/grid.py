@@ -167,6 +167,12 @@ def interpolation_weights(nodes: Sequence[float] | FloatArray, at: float) -> Flo
     return _lagrange_weights(tuple(nodes), at)
 
 
+def enclosing_weights(nodes: Sequence[float] | FloatArray, at: float) -> FloatArray:
+    """Weights (k,), not to be written to, of the polynomial through the four nodes that enclose a place, two on either side where
+    there are as many: nothing that is known farther off changes what is said here."""
+    return _enclosing_weights(tuple(nodes), at)
+
+
 def smooth_weights(nodes: Sequence[float] | FloatArray, at: float) -> FloatArray:
     """Weights (k,), not to be written to, of a curve through all nodes, smooth however many there are: the polynomial up to
     four, then a cubic spline.
@@ -185,6 +191,17 @@ def _lagrange_weights(nodes: tuple[float, ...], at: float) -> FloatArray:
     weights = np.where(own, 1.0, (at - np.array(nodes)) / apart).prod(axis=1)
     weights.flags.writeable = False
     return np.asarray(weights)
+
+
+@lru_cache(maxsize=4096)
+def _enclosing_weights(nodes: tuple[float, ...], at: float) -> FloatArray:
+    order = np.argsort(nodes)
+    below = int(np.searchsorted(np.array(nodes)[order], at)) - 2
+    chosen = order[max(min(below, len(nodes) - 4), 0) :][:4]
+    weights = np.zeros(len(nodes))
+    weights[chosen] = _lagrange_weights(tuple(np.array(nodes)[chosen]), at)
+    weights.flags.writeable = False
+    return weights
 
 
 @lru_cache(maxsize=4096)

@@ -201,7 +201,6 @@ def _ask(
     indices: list[float] = [screening_node(log_p_m)] if sparse else nearest_nodes(log_p_m, problem.node_step)
     if around:
         indices = nodes_around(log_p_m)
-        problem.require_base(indices)
     wanted = [
         (name, amplitude, index)
         for name in hypothesis
