@@ -18,6 +18,7 @@ from ..diagnosis.misfit import say_misfit
 from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
+from ..inference.fits.fitting import Fit
 from ..inference.fits.posterior import Posterior
 from ..inference.problem import Problem
 from ..inference.published.calibrate import summarise
@@ -43,6 +44,18 @@ NUMERICAL_DEPTH = (
 MOST_SAID = 3  # causes that are not testable, on one line
 
 
+def list_samples(problem: Problem, fit: Fit) -> dict[str, float]:
+    """The calibrated strength of each sample, as its drop shows it, in the unit of the common one; none of samples that several
+    instruments recorded, which have it in common."""
+    tracks, scatters = problem.tracks, fit.drops.scatters
+    instants = tracks.instants(fit.nuisances[0])
+    return {
+        model.observed.drop.sample: math.exp(fit.log_p_m + instant.strength)
+        for model, instant, scatter in zip(tracks.models, instants, scatters, strict=True)
+        if scatter > 0.0
+    }
+
+
 def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
     """calibration.json."""
     first, *others = found.posterior.names
@@ -57,6 +70,7 @@ def campaign_calibration_summary(found: Calibration) -> dict[str, Any]:
         "points": found.fit.points,
         "p_value": found.p_value,
         "scatter": found.scatter.summarise(),
+        "samples": list_samples(found.problem, found.fit),
         "error_budget": asdict(found.problem.budget),
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,
@@ -228,6 +242,7 @@ def campaign_diagnosis_summary(found: Diagnosis) -> dict[str, Any]:
         ],
         "numerical_error": state_numerical_error(found.problem),
         "scatter": found.scatter.summarise(),
+        "samples": list_samples(found.problem, found.best),
         "error_budget": asdict(found.problem.budget),
         "runs_new": found.runs_new,
         "runs_reused": found.runs_reused,

@@ -35,7 +35,12 @@ def test_a_range_without_the_truth_is_said_first(tmp_path, p_m_range):
     apart = min(abs(math.log(p_m / end)) for end in p_m_range) / math.sqrt(found.fit.covariance[0, 0])
     (tmp_path / "out").mkdir()
     _, lines = write_result(found, tmp_path / "out")
-    said = json.loads((tmp_path / "out" / "calibration.json").read_text())["warnings"]
+    written = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    said = written["warnings"]
+    if (low, high) == (300.0, 6000.0):  # every sample has a strength of its own about the common one
+        assert list(written["samples"]) == [drop.name for drop in found.campaign.drops]
+        assert np.log(list(written["samples"].values())) == pytest.approx(math.log(p_m), abs=0.06)
+        assert len(set(written["samples"].values())) == len(found.campaign.drops)
     if apart < 2.0:
         assert "end of its range" in said[0] and lines.startswith("warning: the best p_m lies ")
     else:
