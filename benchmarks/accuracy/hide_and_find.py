@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import tempfile
 import time
@@ -61,7 +62,7 @@ def keep(rows: list[dict], table: pd.DataFrame, seed: int) -> list[dict]:
             "commit": row["commit"],
             "hidden": each["hidden"],
             "note": row["truth"]["note"],
-            "sigmas": each["sigmas"],
+            "sigmas": None if math.isnan(each["sigmas"]) else each["sigmas"],
             "ranked": [[name, round(p, 3)] for name, p in row["ranked"][:3]],
             "right": bool(each["right"]),
             "wrong": bool(each["wrong>0.5"]),
