@@ -50,6 +50,7 @@ WORDS = HIDDEN | {
 }
 PROFILES = {"crust": ("surface_crust", "df", "l"), "gradient": ("density_gradient", "slope", "")}
 MOST_ALIKE = 3  # causes of a stated class that still counts as an answer
+STRONG = 8.0  # standard deviations, from which a listed cause should be found
 LEAST_REMOVED = 0.1  # of the mean square, by the truth: where it removes less there is nothing to share
 
 
@@ -191,6 +192,14 @@ def read_rows(*paths: Path) -> list[dict]:
     return [json.loads(line) for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
 
 
+def judge_rows(table: pd.DataFrame) -> pd.Series:
+    """Which rows are right: none where nothing is hidden; unknown, or nothing above 0.5, where nobody listed the cause; else the
+    cause or its stated class first, or none where it is weaker than STRONG."""
+    none, quiet = table["first"] == "none", (table["first"] == "unknown") | (table.P <= 0.5)
+    listed = table["class"] | (none & (table.sigmas < STRONG))
+    return none.where(table.hidden == "none", quiet.where(table.hidden == "unknown", listed))
+
+
 def score(rows: list[dict]) -> pd.DataFrame:
     """Set the answers beside the truth."""
     table = []
@@ -232,7 +241,8 @@ def score(rows: list[dict]) -> pd.DataFrame:
                 "s": round(row["wall"]),
             }
         )
-    return pd.DataFrame(table)
+    scored = pd.DataFrame(table)
+    return scored.assign(right=judge_rows(scored))
 
 
 def main() -> None:

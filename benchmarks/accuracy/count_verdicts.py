@@ -12,10 +12,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.accuracy.blind import read_rows, score
+from benchmarks.accuracy.blind import STRONG, read_rows, score
 from benchmarks.accuracy.draw_accuracy import draw_reliability, find_interval
 
-STRONG = 8.0  # standard deviations, from which a listed cause should be found
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
 
 
@@ -36,18 +35,12 @@ def main() -> None:
     print("| what | how many | share (90 % interval) |\n|---|---|---|")
     for low, high in BANDS:
         some = null & (table.scatter > low) & (table.scatter <= high)
-        count(
-            f"nothing hidden, scatter {100 * low:g} to {100 * high:g} %: none", table["first"][some] == "none"
-        )
-    count(f"one listed cause of {STRONG:g} σ and more: it or its class first", table["class"][strong])
+        count(f"nothing hidden, scatter {100 * low:g} to {100 * high:g} %: none", table.right[some])
+    count(f"one listed cause of {STRONG:g} σ and more: it or its class first", table.right[strong])
     count("… among the at most three named", table["named"][strong])
-    count(
-        "… weaker: it or its class first, or none",
-        (table["class"] | (table["first"] == "none"))[listed & ~strong],
-    )
+    count("… weaker: it or its class first, or none", table.right[listed & ~strong])
     count("a pair: both named", table["exact"][pair])
-    quiet = (table["first"] == "unknown") | (table.P <= 0.5)
-    count("unlisted: unknown, or nothing above 0.5", quiet[unlisted])
+    count("unlisted: unknown, or nothing above 0.5", table.right[unlisted])
     count("all: a wrong cause above 0.5", table["wrong>0.5"])
     count("p_m in its 90 % interval, nothing hidden", table["in 90 %"][null])
     # where the verdict is unknown, p_m is said not to be measured

@@ -3,11 +3,10 @@
     OMP_NUM_THREADS=1 python -m benchmarks.accuracy.hide_and_find [--seed 20261130] [--workers 2] [--store FOLDER]
 
 Six campaigns (fresh.py, without scans where none is needed): one hides nothing, four a listed cause, one a cause that nobody
-listed. Right is: none where nothing is hidden; the cause or its stated class first, or none where it is weaker than 8 standard
-deviations; unknown, or nothing above 0.5, where nobody listed the cause. Wrong is another cause with more than 0.5. The exit
-status is 1 where fewer than LEAST_RIGHT are right or more than MOST_WRONG are wrong: at the rates that docs/drawn-campaigns.md
-counts this is one day in a hundred, so it means that something broke. DAILY keeps a line a campaign, those of one seed in place
-of older ones: the days' lines together say more than a day does.
+listed. Right is what blind.py's ``judge_rows`` says, wrong another cause with more than 0.5. The exit status is 1 where fewer
+than LEAST_RIGHT are right or more than MOST_WRONG are wrong: at the rates that docs/drawn-campaigns.md counts this is less than
+one day in a hundred, so it means that something broke. DAILY keeps a line a campaign, those of one seed in place of older ones:
+the days' lines together say more than a day does.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.accuracy.blind import judge_labelled, read_rows, score
-from benchmarks.accuracy.count_verdicts import STRONG
 from benchmarks.accuracy.fresh import NEED_SCANS, draw_plan
 from benchmarks.lagrangian_mesh.film_campaigns import make_campaign
 from labsim.runs.store import RunStore
@@ -44,13 +42,6 @@ def hide_and_judge(job: tuple[dict, Path, Path | None]) -> dict:
     filmed = time.process_time()
     row = judge_labelled(folder / name, truth, RunStore(store), workers=1)
     return row | {"filming": filmed - began, "judging": time.process_time() - filmed}
-
-
-def judge_rows(table: pd.DataFrame) -> pd.Series:
-    """Which rows of ``score`` are right, as the head of this file says."""
-    none, quiet = table["first"] == "none", (table["first"] == "unknown") | (table.P <= 0.5)
-    listed = table["class"] | (none & (table.sigmas < STRONG))
-    return none.where(table.hidden == "none", quiet.where(table.hidden == "unknown", listed))
 
 
 def keep(rows: list[dict], table: pd.DataFrame, seed: int) -> list[dict]:
@@ -102,7 +93,6 @@ def main() -> None:
                 flush=True,
             )
     table = score(rows)
-    table["right"] = judge_rows(table)
     print(table[["hidden", "sigmas", "first", "P", "right", "wrong>0.5"]].to_string(index=False))
     others = [line for line in read_rows(DAILY) if line["seed"] != options.seed] if DAILY.exists() else []
     lines = sorted(

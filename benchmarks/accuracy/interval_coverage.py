@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import beta
 
+from benchmarks.accuracy.blind import read_rows
+from benchmarks.accuracy.count_verdicts import count
 from benchmarks.truths.measured import LABORATORY, measure_hidden
 from benchmarks.truths.table import Hidden, TruthTable
 from labsim.campaign import read_campaign, read_scan
@@ -58,11 +59,6 @@ def open_campaign(drops: str, maps: bool) -> tuple[Campaign, list[ReducedScan]]:
     return replace(campaign, drops=tuple(chosen), scans=(scan, replace(scan, name="C02"))), []
 
 
-def read_rows(log: Path) -> list[dict]:
-    """What earlier calls have written, one line a campaign."""
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
-
-
 def append_rows(
     log: Path, judge: Callable[[Any], dict], jobs: Sequence, workers: int, say: Callable[[dict], str]
 ) -> None:
@@ -72,14 +68,6 @@ def append_rows(
             file.write(json.dumps(row) + "\n")
             file.flush()
             print(f"{number}/{len(jobs)}{say(row)}", flush=True)
-
-
-def interval(hits: pd.Series) -> str:
-    """Share of True with its Clopper-Pearson interval, 95 %."""
-    of, yes = len(hits), int(hits.sum())
-    low = beta.ppf(0.025, yes, of - yes + 1) if yes else 0.0
-    high = beta.ppf(0.975, yes + 1, of - yes) if yes < of else 1.0
-    return f"{yes}/{of} = {yes / max(of, 1):.2f} [{low:.2f}, {high:.2f}]"
 
 
 def calibrate_hidden(job: tuple[Campaign, Path | None, TruthTable, int, float]) -> dict:
@@ -123,7 +111,7 @@ def main() -> None:
     store = RunStore(options.store)
     truth = TruthTable(campaign, store, workers=options.workers, templates=tuple(templates))
     truth.prepare([])
-    done = {row["seed"] for row in read_rows(log)}
+    done = {row["seed"] for row in (read_rows(log) if log.exists() else [])}
     jobs = [
         (campaign, options.store, truth.holding(Hidden()), seed, options.samples)
         for seed in range(70_000, 70_000 + options.campaigns)
@@ -134,8 +122,8 @@ def main() -> None:
         lambda row: f": {row['p_m']:.0f} in {row['low']:.0f} to {row['high']:.0f}",
     )  # fmt: skip
     table = pd.DataFrame(read_rows(log))
-    print(f"p_m in its 90 % interval {interval((table.low < table.p_m) & (table.p_m < table.high))}")
-    print(f"goodness of fit below 0.05 {interval(table.goodness < 0.05)}")
+    count("p_m in its 90 % interval", (table.low < table.p_m) & (table.p_m < table.high))
+    count("goodness of fit below 0.05", table.goodness < 0.05)
     print(
         f"scatter allowed: {table.scatter.min():.3f} to {table.scatter.max():.3f}, median {table.scatter.median():.3f}"
     )

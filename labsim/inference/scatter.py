@@ -16,12 +16,11 @@ from scipy.linalg import solve_triangular
 from scipy.stats import halfnorm
 
 from ..records import Campaign, FloatArray
-from .fits.fitting import Fit, fit_hypothesis
+from .fits.fitting import Fit, fit_hypothesis, is_stopped
 from .observations.linearised_drop import ErrorBudget
 from .problem import Problem
 
 WIDTH = 0.05  # of the prior of the scatter of ln p_m, half-normal: sieved dust of one batch 2 %, poured soils 10 %
-AT_END = 1e-9  # of ln p_m
 APART = 1.5  # ratio of two scatters that are told apart
 LADDER = (0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.09, 0.13, 0.2, 0.3, 0.5)
 QUANTILES = {"q05": 0.05, "q16": 0.16, "q50": 0.50, "q84": 0.84, "q95": 0.95}
@@ -102,8 +101,7 @@ def find_scatter(problem: Problem, fit: Fit) -> Scatter:
 def find_larger(least: Scatter, problem: Problem, fit: Fit) -> Scatter | None:
     """The scatter that a fit asks for, where it is told apart from the least one and no other is stated. Where its range stops
     p_m all samples ask for another, which is no scatter."""
-    low, high = map(math.log, problem.campaign.p_m_range)
-    if problem.campaign.sample.scatter is not None or not low + AT_END < fit.log_p_m < high - AT_END:
+    if problem.campaign.sample.scatter is not None or is_stopped(problem, fit):
         return None
     asked = find_scatter(problem, fit)
     return asked if asked.value > APART * least.value else None

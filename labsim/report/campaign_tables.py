@@ -45,12 +45,12 @@ MOST_SAID = 3  # causes that are not testable, on one line
 
 
 def list_samples(problem: Problem, fit: Fit) -> dict[str, float]:
-    """The calibrated strength of each sample, as its drop shows it, in the unit of the common one; none of samples that several
-    instruments recorded, which have it in common."""
-    tracks, scatters = problem.tracks, fit.drops.scatters
+    """The calibrated strength of each sample, as its drop shows it, in the unit of the common one, with what the fit's effects
+    change of it; none of samples that several instruments recorded, which have it in common."""
+    tracks, scatters, offsets = problem.tracks, fit.drops.scatters, problem.log_offsets(fit.values)
     instants = tracks.instants(fit.nuisances[0])
     return {
-        model.observed.drop.sample: math.exp(fit.log_p_m + instant.strength)
+        model.observed.drop.sample: math.exp(fit.log_p_m + offsets[model.observed.name] + instant.strength)
         for model, instant, scatter in zip(tracks.models, instants, scatters, strict=True)
         if scatter > 0.0
     }

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
+from benchmarks.accuracy.blind import judge_rows
 from benchmarks.accuracy.fresh import draw_plan
-from benchmarks.accuracy.hide_and_find import LISTED, NULLS, UNLISTED, judge_rows
+from benchmarks.accuracy.hide_and_find import LISTED, NULLS, UNLISTED
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scipy.stats import halfnorm
 from labsim.campaign import read_campaign
 from labsim.effects import Instrument
 from labsim.inference.calibrate import prepare
-from labsim.inference.emulation.forward import predict_depth
+from labsim.inference.emulation.forward import Instant, predict_depth
 from labsim.inference.fits.fitting import fit_hypothesis, fit_p_value, keep_strengths
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.measure import measure
@@ -25,6 +25,7 @@ from labsim.inference.scatter import (
     set_error_budget,
     weigh_least,
 )
+from labsim.report.campaign_tables import list_samples
 from labsim.runs.store import RunStore
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
@@ -174,3 +175,18 @@ def test_p_m_in_common_moves_while_each_sample_keeps_its_strength(one_rod):
         there = fit.log_p_m + change
         block = linearise_at(problem, keep_strengths(problem, fit, there), there, {})[0]
         assert fit.drops.whiten(block.residual) == pytest.approx(white[:, 0] - change * white[:, 1], abs=1e-6)
+
+
+def test_a_sample_is_as_strong_as_its_drop_was_simulated_to_be() -> None:
+    """What an effect changes of ln p_m is in it; a sample that two instruments recorded has no strength of its own."""
+    models = [
+        SimpleNamespace(observed=SimpleNamespace(name=n, drop=SimpleNamespace(sample=f"S{n}"))) for n in "AB"
+    ]
+    instants = [Instant(0.0, 0.0, 0.0, 0.1), Instant(0.0, 0.0, 0.0, 0.0)]
+    problem = SimpleNamespace(
+        tracks=SimpleNamespace(models=models, instants=lambda own: instants),
+        log_offsets=lambda values: {"A": values["sample_drift"], "B": 0.0},
+    )
+    drops = SimpleNamespace(scatters=(0.05, 0.0))
+    fit = SimpleNamespace(log_p_m=7.0, values={"sample_drift": 0.3}, drops=drops, nuisances=[None])
+    assert list_samples(problem, fit) == {"SA": pytest.approx(math.exp(7.4))}

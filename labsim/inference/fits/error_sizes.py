@@ -66,14 +66,13 @@ def integrate_sizes(problem: Problem, fit: Fit, target: Target) -> Callable[[Flo
 
 def _integrate_likelihood(problem: Problem, fit: Fit, log_p_m: float, amplitudes: dict[str, float]) -> float:
     """ln likelihood, over all sizes of the drops' error and, on its own, of the maps'; up to a constant."""
-    drops, maps = [], []
+    drops, maps, nuisances = [], [], keep_strengths(problem, fit, log_p_m)
     for size in SIZES:
         budget = replace(
             problem.budget,
             numerical_change=problem.budget.numerical_change * math.exp(size),
             zone_change=problem.budget.zone_change * math.exp(size),
         )
-        nuisances = keep_strengths(problem, fit, log_p_m)
         blocks = linearise_at(replace(problem, budget=budget), nuisances, log_p_m, amplitudes)
         drops.append(_log_likelihood(blocks[:1]))
         maps.append(_log_likelihood(blocks[1:]))

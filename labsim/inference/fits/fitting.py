@@ -176,6 +176,11 @@ def with_perturbations(
     return linearise_at(problem, fit.nuisances, place, fit.values, names)
 
 
+def is_stopped(problem: Problem, fit: Fit) -> bool:
+    """Whether the range of p_m stops a fit, not the data."""
+    return any(math.isclose(fit.log_p_m, math.log(end), abs_tol=1e-9) for end in problem.campaign.p_m_range)
+
+
 def keep_strengths(problem: Problem, fit: Fit, log_p_m: float) -> tuple[FloatArray, ...]:
     """A fit's nuisances at another ln p_m. Its drops show how strong each sample is, whatever p_m they have in common: with their
     differences from it held instead, curves would bend with p_m in ways that the covariance of the fit does not know."""

@@ -15,7 +15,7 @@ from ...records import FloatArray
 from ..observations.acceleration_model import AccelerationModel
 from ..problem import Problem
 from .blocks import whiten_all
-from .fitting import Fit, keep_strengths
+from .fitting import Fit, is_stopped, keep_strengths
 from .posterior import QuadraticResidual, measure_residual
 from .tangents import linearise_at
 
@@ -73,11 +73,12 @@ def make_target(problem: Problem, fit: Fit) -> Target:
     bounds = [[math.log(p) for p in problem.campaign.p_m_range]]
     bounds += [[limit - parameter.null for limit in parameter.limits] for parameter in parameters]
     nulls = tuple(parameter.null for parameter in parameters)
-    at_end = any(math.isclose(fit.log_p_m, end, abs_tol=1e-9) for end in bounds[0])
     # accelerations of runs at two p_m differ by the noise of their particles too, which a secant takes for what p_m changes and
     # the solver's error of p_m, which lies along the tangent at the fit, does not cover. And where a prior's end stops a fit,
     # chains run along that end far from where the residual is small, and a parabola would turn round there
-    if at_end or any(isinstance(model, AccelerationModel) for model in problem.tracks.models):
+    if is_stopped(problem, fit) or any(
+        isinstance(model, AccelerationModel) for model in problem.tracks.models
+    ):
         white = whiten_all(fit.blocks, ["ln_p_m", *fit.hypothesis])
         misfit = measure_residual(
             lambda theta: white[:, 0] - white[:, 1:] @ (theta - centre), centre, fit.covariance
