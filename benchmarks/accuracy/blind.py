@@ -78,6 +78,7 @@ def describe(name: str, found: Diagnosis) -> dict:
         "p_m_over_causes_90": tuple(np.quantile(found.p_m_averaged, [0.05, 0.95])),
         "p_m_nominal": float(np.median(nominal)),
         "gain": found.gain.fraction_removed,
+        "scatter_in_fit": found.problem.budget.scatter,
         "alike": found.alike,
         "runs_new": found.runs_new,
         "wall": found.wall,

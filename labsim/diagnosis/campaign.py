@@ -189,7 +189,7 @@ def judge_scatters(
 
     open_with : a problem and its nominal fit for a given error budget. A larger scatter is taken where the model that asks for it
     stands, with its prior and its evidence, before all that was found with the least one. The nominal model is asked first: where
-    it stands before all that may be found at all, nothing is looked for with the least one.
+    it then explains the data, and stands before all that tangents promise, nothing is looked for with the least one.
     """
     budget = set_error_budget(campaign)
     problem, nominal = open_with(budget)
@@ -197,7 +197,8 @@ def judge_scatters(
     asked = find_larger(least, problem, nominal)
     if asked is not None:
         _, loose = fit_with(asked, problem, nominal)
-        if asked.log_prior + loose.evidence > least.log_prior + _promise(problem, nominal, seed):
+        explains = fit_p_value(loose) >= REJECTED
+        if explains and asked.log_prior + loose.evidence > least.log_prior + _promise(problem, nominal, seed):
             return judge_campaign(*open_with(replace(budget, scatter=asked.value)), seed=seed)
     found = judge_campaign(problem, nominal, seed=seed)
     larger = _find_larger(found, least)

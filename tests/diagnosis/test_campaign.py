@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.diagnosis.judge import NESTED, PRIOR_PAIRS, TEMPERATURE, judge
 from labsim.inference.fits.blocks import Block
 from labsim.inference.fits.fitting import Fit
+from labsim.inference.observations.linearised_drop import ErrorBudget
+from labsim.inference.scatter import Scatter
 from labsim.runs.store import RunStore
 
 CAMPAIGNS = Path(__file__).parents[2] / "data" / "campaigns"
@@ -143,3 +146,20 @@ def test_a_pair_must_earn_its_second_effect():
 
     assert ratio(6.0) == pytest.approx(math.exp(6.0 / NESTED))
     assert ratio(8.0) == pytest.approx(math.exp(8.0 / NESTED))
+
+
+@pytest.mark.parametrize(("p_value", "judged"), [(0.3, [0.4]), (1e-9, [0.02])])
+def test_a_scatter_that_does_not_explain_the_data_spares_no_search(monkeypatch, p_value, judged):
+    """In p12 mass sticks to the tip. Samples of 42 % scatter are far ahead of those of 2 % and explain nothing; judged with them
+    alone the mass came out as a third of itself."""
+    asked, seen = Scatter(0.4, -18.0), []
+    loose = SimpleNamespace(evidence=1000.0)
+    monkeypatch.setattr(campaign, "set_error_budget", lambda campaign: ErrorBudget())
+    monkeypatch.setattr(campaign, "find_larger", lambda least, problem, fit: asked)
+    monkeypatch.setattr(campaign, "fit_with", lambda scatter, problem, fit: (None, loose))
+    monkeypatch.setattr(campaign, "fit_p_value", lambda fit: p_value)
+    monkeypatch.setattr(campaign, "_promise", lambda problem, nominal, seed: 500.0)
+    monkeypatch.setattr(campaign, "_find_larger", lambda found, least: None)
+    monkeypatch.setattr(campaign, "judge_campaign", lambda problem, nominal, **_: seen.append(problem))
+    campaign.judge_scatters(None, lambda budget: (budget.scatter, None))
+    assert seen == judged
