@@ -317,6 +317,11 @@ def diagnose_campaign(
             f"with {' + '.join(best.hypothesis)}: {text}"
             for text in warn_of_range(problem, best) + warn_unsettled(best)
         ]
+    if learned is not None:
+        law = learned.best.fit
+        doubts += [
+            f"with {' + '.join(law.hypothesis)}: {text}" for text in warn_of_range(learned.problem, law)
+        ]
     doubts += doubt_scales(seen.drops)
     suggestions = suggest(problem, [nominal, *found.rivals], dict(found.verdict.probabilities))
     return Diagnosis(

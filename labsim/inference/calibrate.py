@@ -19,6 +19,7 @@ from ..errors import ExtrapolationError, InferenceError
 from ..own_keys import DUST
 from ..records import Campaign
 from ..runs.store import Progress, RunStore
+from .emulation.nodes import is_farthest
 from .fits.error_sizes import integrate_sizes
 from .fits.fitting import DOUBTFUL, Fit, fit_hypothesis, fit_p_value
 from .fits.posterior import Posterior, sample
@@ -228,21 +229,29 @@ def warn_unsettled(fit: Fit) -> list[str]:
 
 
 def warn_of_range(problem: Problem, fit: Fit) -> list[str]:
-    """A line where p_m is where its range, more than the data, puts it: at an end, or within LEANS standard errors of one.
+    """A line where p_m is where its range, more than the data, puts it: at an end, or within LEANS standard errors of it. One
+    for every effect that is as large as runs are made of.
 
     A fit does not leave the range; its value, χ² and chain are those of the best p_m inside.
     """
     low, high = problem.campaign.p_m_range
     sigma = math.sqrt(fit.covariance[0, 0])
+    lines = []
     for end in (low, high):
         apart = abs(fit.log_p_m - math.log(end)) / sigma
         if apart < LEANS:
             where = "at" if apart < AT else f"{apart:.1f} standard errors from"
-            return [
+            lines.append(
                 f"the best p_m lies {where} the end of its range, {end:.4g} Pa of {low:.4g} to {high:.4g} Pa: the range, not "
                 "the data, says where it stops, and its error does not hold; widen material.p_m_range_Pa"
-            ]
-    return []
+            )
+            break
+    for name, value in fit.values.items():
+        if problem.affects_simulation(name) and is_farthest(problem.effects[name], value):
+            lines.append(
+                f"{name} is as large as simulations are made of: it may be larger, and neither its error nor that of p_m holds"
+            )
+    return lines
 
 
 def warn_unused_scans(problem: Problem) -> list[str]:

@@ -7,7 +7,8 @@ import math
 from ...effects import Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
-LADDER = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # steps of an effect that runs are made of
+# steps of an effect that runs are made of; in p12 as much dust sticks to the tip as 33 steps of that law
+LADDER = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0)
 SPARSE_LADDER = (1.0, 3.0, 8.0)  # the same where they are few
 
 
@@ -61,6 +62,13 @@ def hold_known(effect: Effect, amplitude: float, *, sparse: bool = False) -> flo
     inside = parameter.hold(amplitude) - parameter.null
     grade = parameter.grade(inside)
     return parameter.amplitude_at(math.copysign(most, grade)) if abs(grade) > most else inside
+
+
+def is_farthest(effect: Effect, amplitude: float) -> bool:
+    """Whether the last runs of the ladder, not a limit of the parameter, end an amplitude."""
+    parameter = effect.amplitudes[0]
+    further = parameter.hold(2.0 * amplitude) - parameter.null
+    return not math.isclose(further, amplitude) and math.isclose(hold_known(effect, further), amplitude)
 
 
 def amplitude_nodes(
