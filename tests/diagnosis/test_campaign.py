@@ -150,8 +150,8 @@ def test_a_pair_must_earn_its_second_effect():
 
 @pytest.mark.parametrize(("p_value", "judged"), [(0.3, [0.4]), (1e-9, [0.02])])
 def test_a_scatter_that_does_not_explain_the_data_spares_no_search(monkeypatch, p_value, judged):
-    """In p12 mass sticks to the tip. Samples of 42 % scatter are far ahead of those of 2 % and explain nothing; judged with them
-    alone the mass came out as a third of itself."""
+    """In p12 mass sticks to the tip. Samples of 42 % scatter are far ahead of those of 2 % and explain nothing: the
+    search for what is missing goes on with those of 2 %."""
     asked, seen = Scatter(0.4, -18.0), []
     loose = SimpleNamespace(evidence=1000.0)
     monkeypatch.setattr(campaign, "set_error_budget", lambda campaign: ErrorBudget())
