@@ -8,12 +8,17 @@
 The seed is drawn after the code that is judged is frozen. p_m is even in its logarithm from 700 to 2500 Pa, the scatter of p_m
 between samples from 1 to 10 %; half of the campaigns have two scans. A listed cause is as large as its prior says, without the
 half of the prior that is nearest to nothing. Sizes of unlisted causes are in KINDS. Campaigns stand in random order.
+
+More of some listed causes, all with scans:
+
+    python -m benchmarks.accuracy.fresh --seed 20261130 --nulls 0 --listed 20 --pairs 0 --unlisted 0 \\
+        --only bulk_modulus,shear_strength --scans
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -134,9 +139,17 @@ def join(one: dict, other: dict) -> dict:
 
 
 def draw_plan(
-    seed: int, *, nulls: int, listed: int, pairs: int, unlisted: int, letter: str = "n"
+    seed: int,
+    *,
+    nulls: int,
+    listed: int,
+    pairs: int,
+    unlisted: int,
+    letter: str = "n",
+    only: Sequence[str] = tuple(LISTED),
+    scans: bool = False,
 ) -> list[dict]:
-    """What is hidden in each campaign, with all that a plan says of it."""
+    """What is hidden in each campaign, with all that a plan says of it. only : listed causes that are dealt; scans : all have."""
     rng, effects = np.random.default_rng(seed), list_effects(None)
 
     def deal(names: list[str], count: int) -> list[str]:
@@ -145,7 +158,7 @@ def draw_plan(
         return [str(next(order)) for _ in range(count)]
 
     causes: list[dict] = [{"cause": "none"} for _ in range(nulls)]
-    for name in deal(list(LISTED), listed):
+    for name in deal(list(only), listed):
         causes.append({"cause": name, **draw_listed(effects[name], rng)})
     for _ in range(pairs):
         pair = sorted(map(str, rng.choice(list(LISTED), 2, replace=False)))
@@ -161,7 +174,7 @@ def draw_plan(
             "seed": int(rng.integers(2**31)),
             "scatter": between(rng, *SCATTER),
             "noise_slope": float(rng.uniform(-NOISE_SLOPE, NOISE_SLOPE)),
-            "scans": bool(rng.uniform() < 0.5) or any(name in each["cause"] for name in NEED_SCANS),
+            "scans": bool(rng.uniform() < 0.5) or scans or any(name in each["cause"] for name in NEED_SCANS),
         }
         plan.append({"name": f"{letter}{k + 1:03d}", **each, **drawn})
     return plan
@@ -175,6 +188,8 @@ def main() -> None:
     for kind, count in (("nulls", 30), ("listed", 36), ("pairs", 8), ("unlisted", 28)):
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--letter", default="n")
+    parser.add_argument("--only", type=lambda names: names.split(","), default=list(LISTED))
+    parser.add_argument("--scans", action="store_true", help="all campaigns have two")
     asked = parser.parse_args()
     print(f"# benchmarks/accuracy/fresh.py --seed {asked.seed}")
     for each in draw_plan(**vars(asked)):
