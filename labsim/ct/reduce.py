@@ -21,7 +21,7 @@ from .systematic import find_directions, find_halo
 
 CELL = 2  # voxels along an edge of a cell
 GUARD = 3.0  # voxels about the bead that belong to its point spread, not to the dust
-GUARD_BLURS = 3.5  # the same in standard deviations of a wide point spread
+GUARD_BLURS = 3.5  # the same in standard deviations of a wide point spread; about the surface too
 TILT_SEEN = (4.0, np.deg2rad(0.4))  # a lean is followed where it is this many sigma and at least this large
 STRONG_CUP = 0.15  # share of the dust's level
 STRONG_CUP_WORDS = (
@@ -76,6 +76,11 @@ class ReducedScan(Summarised):
     def point_spread(self) -> float:
         """m; one voxel where the bead's edge shows none."""
         return self.blur if np.isfinite(self.blur) else self.scan.voxel
+
+    @property
+    def edge(self) -> float:
+        """m below the undisturbed surface, from which on less than a thousandth of a cell is air: the point spread mixes them."""
+        return GUARD_BLURS * max(self.point_spread, self.scan.voxel)
 
     @property
     def bead_centre_z(self) -> float:

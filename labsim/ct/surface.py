@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from .slices.stack import SliceStack
 
 LEANS = np.deg2rad(1.5)  # lean of the surface that is followed; smaller ones change no cell by its sigma
 PASSES = 3  # in which the lean is refined
+WIDTHS = 2.5  # of the step, below which dust is seen in full
 
 
 @dataclass(frozen=True)
@@ -120,16 +122,16 @@ def _fit_step(
     first = int(crossings[0])
     air_rows, dust_rows = mean[: max(1, first - 3)], mean[first + 5 :]
     air, dust = float(np.mean(air_rows)), float(np.median(dust_rows))
-    # half of the step that is there: a crust's own level, not the bulk's, lies below the surface
-    below_surface = float(mean[first + 3 : first + 7].mean())
-    row = _cross(mean, 0.5 * (air + below_surface), first)
-    gx = 0.5 * (rows[2] + rows[3] - rows[0] - rows[1])
-    gy = 0.5 * (rows[1] + rows[3] - rows[0] - rows[2])
-    arm = 2 * np.mean(np.abs(x - axis[0])[far])
     step = np.clip(np.diff(mean[max(0, first - 6) : first + 8]) / (dust - air), 0, None)
     position = np.arange(len(step))
     centre = (step * position).sum() / step.sum()
     width = float(np.sqrt((step * (position - centre) ** 2).sum() / step.sum()))
+    # half of the step that is there: a crust's own level, not the bulk's, lies below the surface, and below what a blur mixes
+    full = min(first + max(3, math.ceil(WIDTHS * width)), len(mean) - 1)
+    row = _cross(mean, 0.5 * (air + float(mean[full : full + 4].mean())), first)
+    gx = 0.5 * (rows[2] + rows[3] - rows[0] - rows[1])
+    gy = 0.5 * (rows[1] + rows[3] - rows[0] - rows[2])
+    arm = 2 * np.mean(np.abs(x - axis[0])[far])
     air_scatter = float(stack.slice(0)[far].std())
     dust_scatter = float(stack.slice(stack.count - 1)[far].std())
     row_sigma = float(max(rows.std(ddof=1) / 2, 0.01))

@@ -13,6 +13,7 @@ from labsim.diagnosis.shapes import lay_out_shapes, shape_parameter
 from labsim.effects import list_effects
 from labsim.inference.fits.tangents import linearise_alone
 from labsim.inference.measure import Measurements, measure
+from labsim.inference.observations.compacted_zone import observe_scan
 from labsim.inference.observations.undisturbed import UndisturbedDust, observe_undisturbed
 from labsim.inference.open_problem import open_problem
 from labsim.records import Scan
@@ -110,3 +111,19 @@ def test_a_phantom_gives_its_filling_factor_and_its_blur(tmp_path, blur):
     white = (dust.filling_factor - 0.15) / np.hypot(dust.sigma, 3e-4)
     assert np.sqrt(np.mean(white**2)) < 1.5
     assert dust.point_spread / phantom.voxel == pytest.approx(math.hypot(blur, 0.3), rel=0.25)
+
+
+@pytest.mark.parametrize("blur", [1.6, 3.4])
+def test_a_wide_point_spread_moves_neither_the_surface_nor_the_dust_below_it(tmp_path, blur):
+    """Air that was mixed into the first rows, up to a hundredth, was called a gradient; the tip seemed 0.7 voxels deeper."""
+    phantom = Phantom(
+        zone_width=0.8, noise=0.02, blur=blur, shape=(130, 150, 150), centre=(61.3, 60.6, 49.4), radius=16.5
+    )
+    reduced = reduce_scan(phantom.write(tmp_path / "slices"))
+    depth = phantom.centre[2] + phantom.radius - phantom.surface
+    assert reduced.map.tip_depth / phantom.voxel == pytest.approx(depth, abs=0.05)
+    dust = observe_undisturbed(reduced)
+    assert dust is not None and dust.depth[0] > 3.0 * blur * phantom.voxel
+    assert np.abs((dust.filling_factor - 0.15) / np.hypot(dust.sigma, 3e-4))[:3].max() < 2.0
+    cells = observe_scan(reduced).cells
+    assert reduced.map.z[cells.any(axis=1)].max() < -3.0 * blur * phantom.voxel

@@ -90,10 +90,10 @@ class ObservedScan:
 
 
 def observe_scan(reduced: ReducedScan) -> ObservedScan:
-    """Choose the cells: within three tip radii of the axis, from two below the tip to a third above it."""
+    """Choose the cells: within three tip radii of the axis, from two below the tip to a third above it, none with air in it."""
     found, radius = reduced.map, reduced.scan.projectile.tip_radius
     r, z = np.meshgrid(found.r, found.z)
-    inside = (r < 3 * radius) & (z < -0.25 * radius)
+    inside = (r < 3 * radius) & (z < -max(0.25 * radius, reduced.edge))
     cells = reduced.usable & inside & (np.abs(z + found.tip_depth + 0.85 * radius) < 1.15 * radius)
     level = float(reduced.undisturbed.value)
     dust = observe_undisturbed(reduced)

@@ -54,8 +54,7 @@ def observe_undisturbed(reduced: ReducedScan) -> UndisturbedDust | None:
     centre = reduced.bead_centre_z
     apart = np.where(z > centre, r, np.hypot(r, z - centre))
     spread = reduced.point_spread
-    edge = 2.5 * max(spread, reduced.scan.voxel) + reduced.scan.voxel
-    good = reduced.usable & (apart > REACH * radius) & (z < -edge) & (found.sigma > 0)
+    good = reduced.usable & (apart > REACH * radius) & (z < -reduced.edge) & (found.sigma > 0)
     depth, level, sigma = [], [], []
     inflate = math.sqrt(
         (1 + max(reduced.errors.correlation_r, 0.0)) / (1 - min(reduced.errors.correlation_r, 0.9))
