@@ -30,6 +30,7 @@ import pandas as pd
 
 from benchmarks.accuracy.hidden_laws import find_law
 from benchmarks.campaigns.labelled import SCATTER
+from benchmarks.campaigns.scan import VOXEL
 from benchmarks.material_points.compare_changes import HIDDEN
 from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import Diagnosis, diagnose_campaign
@@ -124,6 +125,8 @@ def read_hidden(truth: dict) -> dict[str, tuple[float, float | None]]:
     terms = truth["mat"] | truth["dyn"] | truth["measure"] | truth["ct"]
     exponent = terms.pop("raten", None)
     values: dict[str, tuple[float, float | None]] = {}
+    if "blur_mm" in terms:
+        values["ct_blur"] = 1e-3 * terms.pop("blur_mm") - VOXEL, None
     if "side" in terms:  # the shared campaigns tell it in words, per length of a 1 mm rod
         told = re.search(r"([\d.]+) N/m", truth["note"])
         side = terms.pop("side")

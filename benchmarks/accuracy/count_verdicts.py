@@ -17,6 +17,7 @@ from benchmarks.accuracy.draw_accuracy import draw_reliability, find_interval
 
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
 POWER = 6.0  # standard deviations, from which a cause that nobody listed should be seen
+UNSEEN = 1.0  # the same, below which p_m makes up for a cause
 OFTEN = ("bulk_modulus", "shear_strength")  # causes that are counted by themselves
 
 
@@ -52,6 +53,9 @@ def main() -> None:
     # where the verdict is unknown, p_m is said not to be measured
     said = ~null & ~told
     count("p_m in its 90 % interval, something hidden, the first cause fitted", table["in 90 %"][said])
+    made_up = table.sigmas < UNSEEN
+    count(f"… a cause of less than {UNSEEN:g} σ, which p_m makes up for", table["in 90 %"][said & made_up])
+    count("… all others", table["in 90 %"][said & ~made_up])
     count("… over all causes that are not excluded", table["in 90 % over causes"][said].dropna())
     print(f"\nexpected calibration error {draw_reliability(table)[1]:.3f}")
 
