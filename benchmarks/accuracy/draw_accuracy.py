@@ -73,7 +73,7 @@ def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
         xlabel="probability of the cause that stands first",
         ylabel="share that is right",
         xlim=(0, 1.02),
-        ylim=(0, 1.02),
+        ylim=(0, 1.06),  # room for a label at one
     )
     return figure, error
 
