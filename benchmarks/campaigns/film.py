@@ -14,6 +14,7 @@ SURFACE_SIGMA = 0.15  # px
 HEIGHT_SIGMA = 0.15e-3  # m
 MISSING = 0.0095  # share of the frames
 OUTLIERS = 0.0017
+READINGS = 30  # times that an instant is put right; each leaves speed x line_time / pixel_size of the last error, up to 0.5
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def film(result: Result, speed: float, filming: Filming, rng: np.random.Generato
     pixel = filming.pixel_size * filming.pixel_factor
     below = depth_at(result, time) / pixel
     if filming.line_time:
-        for _ in range(3):  # the tip is where it is when its own row is read
+        for _ in range(READINGS):  # the tip is where it is when its own row is read
             below = depth_at(result, time + filming.line_time * below) / pixel
     rows = surface + below
     amplitude, frequency = filming.wobble
