@@ -160,8 +160,11 @@ def test_a_second_time_takes_seconds_and_gives_the_same(
     case: str, shared_store: str, first: tuple[Path, str], tmp_path: Path
 ) -> None:
     """Each of the two campaigns that the demo shows, by itself."""
+    # on a machine that others use a second of processor time is worth more in one moment than in the next
+    _out, before_it = run_python(["-c", LIBRARIES])
     _out, seconds = run_demo(shared_store, tmp_path, "--case", case)
-    _out, importing = run_python(["-c", LIBRARIES])
+    _out, after_it = run_python(["-c", LIBRARIES])
+    importing = max(before_it, after_it)
     print(f"{case}: {seconds:.1f} s, importing {importing:.1f} s")
     folder = first[0] if case == "dust" else first[0] / case
     before, after = load(folder, "diagnosis.json"), load(tmp_path, "diagnosis.json")
