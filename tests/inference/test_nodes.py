@@ -208,7 +208,7 @@ def test_no_amplitude_lies_beyond_the_largest_that_runs_are_made_of(name, sparse
     for asked in (1e9, -1e9, 60 * parameter.step, -60 * parameter.step, 0.4 * parameter.step):
         held = hold_known(effect, asked, sparse=sparse)
         assert parameter.hold(held) == pytest.approx(parameter.null + held)
-        assert abs(parameter.grade(held)) <= (8 if sparse else 48) * unit * (1 + 1e-12)
+        assert abs(parameter.grade(held)) <= (8 if sparse else 12) * unit * (1 + 1e-12)
         # the farthest node lies at it or beyond
         nodes = [abs(parameter.grade(each)) for each in amplitude_nodes(effect, held, sparse=sparse)]
         assert max(nodes) >= abs(parameter.grade(held)) * (1 - 1e-9)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-from ...effects import Effect
+from ...effects import Cauchy, Effect
 from .grid import STRENGTH_ANCHOR, STRENGTH_RATIO
 
-# steps of an effect that runs are made of; in p12 as much dust sticks to the tip as 33 steps of that law
-LADDER = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0)
+LADDER = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # steps of an effect that runs are made of
+# further ones, of laws whose size nobody knows: in p12 as much dust sticks to the tip as 33 steps
+FURTHER = (16.0, 24.0, 32.0, 48.0)
 SPARSE_LADDER = (1.0, 3.0, 8.0)  # the same where they are few
 
 
@@ -55,10 +56,17 @@ def screening_node(log_p_m: float) -> int:
     return 2 * round(0.5 * place_strength(log_p_m))
 
 
+def _list_steps(effect: Effect, sparse: bool) -> tuple[float, ...]:
+    """Of an effect, rising, that runs are made of."""
+    if sparse:
+        return SPARSE_LADDER
+    return LADDER + FURTHER if isinstance(effect.amplitudes[0].prior, Cauchy) else LADDER
+
+
 def hold_known(effect: Effect, amplitude: float, *, sparse: bool = False) -> float:
     """An amplitude kept within the largest that runs are made of: about a p_m that has run away tangents ask for anything."""
     parameter = effect.amplitudes[0]
-    most = (SPARSE_LADDER if sparse else LADDER)[-1] * abs(parameter.grade(parameter.step))
+    most = _list_steps(effect, sparse)[-1] * abs(parameter.grade(parameter.step))
     inside = parameter.hold(amplitude) - parameter.null
     grade = parameter.grade(inside)
     return parameter.amplitude_at(math.copysign(most, grade)) if abs(grade) > most else inside
@@ -95,7 +103,7 @@ def amplitude_nodes(
     if effect.kind == "numerics" or (abs(place) <= 1.0 and not bent):
         wanted = [sign]
     else:
-        ladder = SPARSE_LADDER if sparse else LADDER
+        ladder = _list_steps(effect, sparse)
         if bent:
             ladder = tuple(sorted({0.5, *ladder} if sparse else {0.25, 0.5, 0.75, 1.5, *ladder}))
         above = [m for m in ladder if m >= abs(place)] or [ladder[-1]]
