@@ -41,11 +41,12 @@ def needs_exploration(
 ) -> bool:
     """Whether the nominal model fails, and either nothing explains the data or only what p_m can be traded for.
 
-    However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another.
-    log_evidence_unknown : ln evidence of a law without a name.
+    However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another. What the
+    tangent of an effect promises counts until it is fitted. log_evidence_unknown : ln evidence of a law without a name.
     """
     found = max(fits, key=lambda fit: fit.evidence, default=nominal)
-    gain, screened = found.evidence - nominal.evidence, [each.log_bayes for each in screening.scores[:1]]
+    gain, fitted = found.evidence - nominal.evidence, {fit.hypothesis for fit in fits}
+    screened = [each.log_bayes for each in screening.scores if (each.name,) not in fitted]
     best = max([log_evidence_unknown - nominal.evidence, gain, *screened])
     if best <= PROMISING and fit_p_value(nominal) >= DOUBTFUL:
         return False

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from labsim.diagnosis import campaign
+from labsim.diagnosis import campaign, explore
 from labsim.inference.emulation.forward import ResponseTable
 
 
@@ -85,3 +85,17 @@ def test_a_cause_whose_runs_fail_is_said_not_to_be_judged():
     assert said.startswith("shear_strength: is not judged")
     tables[1].fingerprints["shear_strength"][-2] = {0.7: np.zeros((1, 2))}
     assert campaign.warn_failed(problem) == []
+
+
+@pytest.mark.parametrize(
+    ("fitted", "explored"),
+    [([], True), ([("viscosity", 98.0)], False), ([("viscosity", 98.0), ("row", 104.0)], True)],
+)
+def test_a_promise_that_its_own_fit_has_refuted_asks_for_no_search(monkeypatch, fitted, explored):
+    """In p01 the tangent of the viscosity promised 3.2 where its fit gained nothing; a thousand runs followed."""
+    monkeypatch.setattr(explore, "fit_p_value", lambda fit: 0.5)
+    scores = [SimpleNamespace(name="viscosity", log_bayes=3.2), SimpleNamespace(name="row", log_bayes=1.0)]
+    problem = SimpleNamespace(effects={"row": SimpleNamespace(kind="material")})
+    fits = [a_fit(name, evidence) for name, evidence in fitted]
+    screening = SimpleNamespace(scores=scores)
+    assert explore.needs_exploration(problem, a_fit("", 100.0), fits, screening, 90.0) is explored
