@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.accuracy.blind import STRONG, read_rows, score
-from benchmarks.accuracy.draw_accuracy import draw_reliability, find_interval
+from benchmarks.accuracy.draw_accuracy import find_calibration_error, find_interval
 
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
 POWER = 6.0  # standard deviations, from which a cause that nobody listed should be seen
@@ -57,7 +57,7 @@ def main() -> None:
     count(f"… a cause of less than {UNSEEN:g} σ, which p_m makes up for", table["in 90 %"][said & made_up])
     count("… all others", table["in 90 %"][said & ~made_up])
     count("… over all causes that are not excluded", table["in 90 % over causes"][said].dropna())
-    exact, right = draw_reliability(table)[1], draw_reliability(table.assign(exact=table.right))[1]
+    exact, right = (find_calibration_error(table.P, table[each]) for each in ("exact", "right"))
     print(
         f"\nexpected calibration error {exact:.3f} of exact causes, {right:.3f} of what the rows above call right"
     )

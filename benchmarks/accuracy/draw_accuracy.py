@@ -52,38 +52,46 @@ def find_interval(right: int, of: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def draw_reliability(table: pd.DataFrame) -> tuple[plt.Figure, float]:
-    """Share of right verdicts against the probability said, with 90 % intervals, and the expected calibration error."""
+def bin_verdicts(said: pd.Series, right: pd.Series) -> list[tuple[float, int, int]]:
+    """Of each of BINS that has verdicts: the mean probability that is said, how many are right, how many there are."""
+    bins = [(said > low) & (said <= high) for low, high in pairwise(BINS)]
+    return [
+        (float(said[each].mean()), int(right[each].sum()), int(each.sum())) for each in bins if each.any()
+    ]
+
+
+def find_calibration_error(said: pd.Series, right: pd.Series) -> float:
+    """Expected: the mean distance of the probability that is said from the share that is right, by number."""
+    distances = [number * abs(mean - hits / number) for mean, hits, number in bin_verdicts(said, right)]
+    return sum(distances) / len(said)
+
+
+def draw_reliability(table: pd.DataFrame) -> plt.Figure:
+    """Share of verdicts that are exact against the probability said, with 90 % intervals."""
     figure, ax = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
     ax.plot([0, 1], [0, 1], color="0.6", lw=1)
-    error = 0.0
-    for low, high in pairwise(BINS):
-        inside = table[(table.P > low) & (table.P <= high)]
-        if inside.empty:
-            continue
-        right, all_ = int(inside.exact.sum()), len(inside)
-        said, true = inside.P.mean(), right / all_
-        ax.plot([said, said], find_interval(right, all_), color="tab:blue", lw=1.2)
-        ax.plot(said, true, "o", color="tab:blue")
+    for said, hits, number in bin_verdicts(table.P, table.exact):
+        share = hits / number
+        ax.plot([said, said], find_interval(hits, number), color="tab:blue", lw=1.2)
+        ax.plot(said, share, "o", color="tab:blue")
         ax.annotate(
-            f"{right} of {all_}", (said, true), (-6, 4), textcoords="offset points", ha="right", fontsize=8
+            f"{hits} of {number}", (said, share), (-6, 4), textcoords="offset points", ha="right", fontsize=8
         )
-        error += all_ / len(table) * abs(said - true)
     ax.set(
         xlabel="probability of the cause that stands first",
         ylabel="share that is right",
         xlim=(0, 1.02),
         ylim=(0, 1.06),  # room for a label at one
     )
-    return figure, error
+    return figure
 
 
 def main() -> None:
     folder, *paths = map(Path, sys.argv[1:])
     table = score(read_rows(*paths))
     draw_confusion(table).savefig(folder / "confusion.png", dpi=110)
-    figure, error = draw_reliability(table)
-    figure.savefig(folder / "reliability.png", dpi=110)
+    draw_reliability(table).savefig(folder / "reliability.png", dpi=110)
+    error = find_calibration_error(table.P, table.exact)
     print(
         f"{len(table)} campaigns: first is right in {int(table.exact.sum())}; expected calibration error {error:.3f}"
     )

@@ -23,6 +23,7 @@ import pandas as pd
 
 from benchmarks.accuracy.blind import read_rows
 from benchmarks.accuracy.count_verdicts import count
+from benchmarks.campaigns.scan import VOXEL
 from benchmarks.truths.measured import LABORATORY, measure_hidden
 from benchmarks.truths.table import Hidden, TruthTable
 from labsim.campaign import read_campaign, read_scan
@@ -38,7 +39,6 @@ LABELLED_SCANS = CAMPAIGN.parents[1] / "ct" / "labelled_scans"
 SCANS = [LABELLED_SCANS / name for name in ("p01-C01", "p05-C02")]  # frames, masks and errors of maps
 # rods of 0.5 mm and of 1.5 mm radius, slow to fast
 STANDARD = "D01,D02,D03,D05,D06,D07,D11,D13,D14"
-VOXEL = 40e-6  # m
 SPREAD = 0.15  # of ln p_m about 1300 Pa, inside the truth's own nodes
 
 

@@ -197,8 +197,8 @@ def judge_scatters(
     asked = find_larger(least, problem, nominal)
     if asked is not None:
         _, loose = fit_with(asked, problem, nominal)
-        explains = fit_p_value(loose) >= REJECTED
-        if explains and asked.log_prior + loose.evidence > least.log_prior + _promise(problem, nominal, seed):
+        reached = asked.log_prior + loose.evidence
+        if not fails(loose) and reached > least.log_prior + _promise(problem, nominal, seed):
             return judge_campaign(*open_with(replace(budget, scatter=asked.value)), seed=seed)
     found = judge_campaign(problem, nominal, seed=seed)
     larger = _find_larger(found, least)
