@@ -249,7 +249,7 @@ def warn_of_range(problem: Problem, fit: Fit) -> list[str]:
     for name, value in fit.values.items():
         if problem.affects_simulation(name) and is_farthest(problem.effects[name], value):
             lines.append(
-                f"{name} is as large as simulations are made of: it may be larger, and neither its error nor that of p_m holds"
+                f"{name} is at the largest value that is simulated: it may be larger, and neither its error nor that of p_m holds"
             )
     return lines
 

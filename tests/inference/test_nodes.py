@@ -9,6 +9,7 @@ import pytest
 from labsim.diagnosis.unlisted.hats import make_effect
 from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, list_effects
 from labsim.effects.terms import list_terms
+from labsim.inference.calibrate import warn_of_range
 from labsim.inference.emulation.forward import ResponseTable
 from labsim.inference.emulation.grid import (
     FELT_STEPS,
@@ -233,3 +234,15 @@ def test_a_law_many_times_its_usual_size_lies_between_runs():
 def test_a_limit_of_the_parameter_is_not_the_end_of_the_runs():
     friction = list_effects(None)["contact_friction"]
     assert not is_farthest(friction, friction.amplitudes[0].limits[1])
+
+
+def test_a_fit_that_ends_where_runs_end_says_so():
+    effect = make_effect(list_terms()["stuck_mass"], 0.05)
+    problem = SimpleNamespace(
+        campaign=SimpleNamespace(p_m_range=(300.0, 6000.0)),
+        effects={"stuck_mass": effect},
+        affects_simulation=lambda name: True,
+    )
+    for value, said in ((0.5, []), (hold_known(effect, 100.0), ["stuck_mass is at the largest value"])):
+        fit = SimpleNamespace(log_p_m=7.0, covariance=1e-3 * np.eye(2), values={"stuck_mass": value})
+        assert [line[:34] for line in warn_of_range(problem, fit)] == said
