@@ -13,7 +13,12 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.accuracy.blind import STRONG, read_rows, score
-from benchmarks.accuracy.draw_accuracy import find_calibration_error, find_interval
+from benchmarks.accuracy.draw_accuracy import (
+    expect_calibration_error,
+    find_calibration_error,
+    find_interval,
+    weigh_rows,
+)
 
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
 POWER = 6.0  # standard deviations, from which a cause that nobody listed should be seen
@@ -57,10 +62,17 @@ def main() -> None:
     count(f"… a cause of less than {UNSEEN:g} σ, which p_m makes up for", table["in 90 %"][said & made_up])
     count("… all others", table["in 90 %"][said & ~made_up])
     count("… over all causes that are not excluded", table["in 90 % over causes"][said].dropna())
-    exact, right = (find_calibration_error(table.P, table[each]) for each in ("exact", "right"))
-    print(
-        f"\nexpected calibration error {exact:.3f} of exact causes, {right:.3f} of what the rows above call right"
-    )
+    print("\nexpected calibration error")
+    for name, weight in (
+        ("causes as frequent as the prior says", weigh_rows(table.hidden)),
+        ("as drawn", table.P * 0 + 1),
+    ):
+        exact, right = (find_calibration_error(table.P, table[each], weight) for each in ("exact", "right"))
+        low, high = expect_calibration_error(table.P, weight)
+        print(
+            f"{name}: {exact:.3f} of exact causes ({low:.3f} to {high:.3f} were every probability to hold), "
+            f"{right:.3f} of what the rows above call right"
+        )
 
 
 if __name__ == "__main__":

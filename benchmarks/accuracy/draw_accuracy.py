@@ -3,8 +3,9 @@
     python -m benchmarks.accuracy.draw_accuracy DIR ROWS.jsonl [ROWS.jsonl ...]
 
 Writes DIR/confusion.png and DIR/reliability.png and prints the expected calibration error: the mean distance between the
-probability of the cause that stands first and the share of such verdicts that are right, over bins of that probability, weighted
-by their number.
+probability of the cause that stands first and the share of such verdicts that are right, over bins of that probability. Rows
+count such that none, listed causes, pairs and what nobody listed have together what the prior gives them: probabilities can only
+hold where causes are as frequent as the prior says.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import pandas as pd
 from scipy.stats import beta
 
 from benchmarks.accuracy.blind import read_rows, score
+from labsim.diagnosis.judge import PRIOR_NONE, PRIOR_PAIRS, PRIOR_UNKNOWN
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -60,10 +62,30 @@ def bin_verdicts(said: pd.Series, right: pd.Series) -> list[tuple[float, int, in
     ]
 
 
-def find_calibration_error(said: pd.Series, right: pd.Series) -> float:
-    """Expected: the mean distance of the probability that is said from the share that is right, by number."""
-    distances = [number * abs(mean - hits / number) for mean, hits, number in bin_verdicts(said, right)]
-    return sum(distances) / len(said)
+def find_calibration_error(said: pd.Series, right: pd.Series, weight: pd.Series) -> float:
+    """Expected: the mean distance of the probability that is said from the share that is right, over BINS."""
+    distance = weight * (said - right.astype(float))
+    return float(distance.groupby(pd.cut(said, BINS)).sum().abs().sum() / weight.sum())
+
+
+def expect_calibration_error(said: pd.Series, weight: pd.Series, draws: int = 1000) -> tuple[float, float]:
+    """90 % interval of the error that as many verdicts have whose probabilities hold: few rows are never without one."""
+    rng = np.random.default_rng(0)
+    errors = [
+        find_calibration_error(said, pd.Series(rng.random(len(said)) < said.to_numpy(), said.index), weight)
+        for _ in range(draws)
+    ]
+    low, high = np.quantile(errors, [0.05, 0.95])
+    return float(low), float(high)
+
+
+def weigh_rows(hidden: pd.Series) -> pd.Series:
+    """What each row counts, so that all rows of a kind have together what the prior gives that kind."""
+    kind = hidden.where(hidden.isin(["none", "unknown"]), "single")
+    kind = kind.mask(hidden.str.contains(" + ", regex=False), "pair")
+    prior = {"none": PRIOR_NONE, "unknown": PRIOR_UNKNOWN, "pair": PRIOR_PAIRS}
+    prior["single"] = 1 - sum(prior.values())
+    return kind.map(prior) / kind.map(kind.value_counts())
 
 
 def draw_reliability(table: pd.DataFrame) -> plt.Figure:
@@ -91,7 +113,7 @@ def main() -> None:
     table = score(read_rows(*paths))
     draw_confusion(table).savefig(folder / "confusion.png", dpi=110)
     draw_reliability(table).savefig(folder / "reliability.png", dpi=110)
-    error = find_calibration_error(table.P, table.exact)
+    error = find_calibration_error(table.P, table.exact, weigh_rows(table.hidden))
     print(
         f"{len(table)} campaigns: first is right in {int(table.exact.sum())}; expected calibration error {error:.3f}"
     )
