@@ -11,6 +11,7 @@ from labsim.effects.terms import list_terms
 
 AREA = math.pi * SMALL**2
 STRENGTH, SPEED, DEPTH, SIZE = "strength", "force of speed", "force of depth", "strength of size"
+BOTH = "drag of depth"
 MASS, SAMPLE, CAMERA = "mass", "sample", "camera"
 NEAR = 1.5  # of a depth: as thick as a layer is, which is half of how deep it lies
 # a place of a law, or the words of one without a formula -> where that is; others are their own names
@@ -71,8 +72,8 @@ def find_law(truth: dict) -> HiddenLaw | None:
         return HiddenLaw((SPEED,), {"inertial_drag": forces["inertial"] / AREA})
     if "viscous" in forces:
         return HiddenLaw((SPEED,), {"viscous_drag": forces["viscous"] / AREA})
-    if "shaft_drag" in forces:  # goes with depth times the square of the speed
-        return HiddenLaw((SPEED, DEPTH), {"inertial_drag": None, "depth_spring": None})
+    if "shaft_drag" in forces:  # N s²/m² a metre of length
+        return HiddenLaw((BOTH, SPEED, DEPTH), {"shaft_drag": forces["shaft_drag"] / (math.pi * SMALL)})
     if "pull" in forces:
         return HiddenLaw((DEPTH,), {"rim_pull": forces["pull"] / (2 * math.pi * SMALL), "pull": None})
     if "film" in forces:  # a force down to a depth in m

@@ -1,10 +1,11 @@
 """Where the equations, or the clock of a camera, have a place for a law that is not in them, one record each.
 
     m (1 + d(z/a) + k(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) (1 + l(z0)) exp(f(a)), Y (1 + h(ε))]
-                                           - A (b(z/a) + s(z)) - p(z) - 2π a q(z) - A c(v) - m k'(z/a) v²/a
+                                           - A (b(z/a) + s(z)) - p(z) - 2π a q(z)
+                                           - A (c(v) + j(t) + v n(z/a) + v² o(z/a)) - m k'(z/a) v²/a
 
 m is the mass of the projectile, A the cross-section of its tip, a its radius; ε the plastic shear strain of the dust, z0 where it
-lay. Most forces are pressures, so that one law holds for all sizes.
+lay, t the time since contact. Most forces are pressures, so that one law holds for all sizes.
 """
 
 from __future__ import annotations
@@ -31,9 +32,10 @@ class LawPlace:
     """over, unit : what a law goes with there; value_unit : of what it gives; words : that in front of a formula.
 
     shown, shown_unit : that at an axis. reach : of what it goes with, as far as drops come. least : smallest value, a smaller one
-    ``breaks`` physics; of a camera's, and most, ends of its coefficients. scale : a usual value. knots : of what it goes with, in
-    shares of the deepest drop where that is mm, for a law without a formula; none where no runs say what it changes. add : to a
-    drop, a table of knots; see : to a camera, a coefficient at a size of its pixels (m).
+    ``breaks`` physics; of a camera's, and most, ends of its coefficients; rising : whether falling values do, too. scale : a
+    usual value. knots : of what it goes with, in shares of the deepest drop where that is mm, for a law without a formula; none
+    where no runs say what it changes. add : to a drop, a table of knots; see : to a camera, a coefficient at a size of its pixels
+    (m).
     """
 
     name: str
@@ -51,6 +53,7 @@ class LawPlace:
     add: Callable[[DropSetting, Knots], DropSetting] | None
     see: Callable[[Instrument, float, float], Instrument] | None = None
     most: float = math.inf
+    rising: bool = False
 
     @property
     def simulated(self) -> bool:
@@ -88,26 +91,19 @@ def _add_share(key: str, unit: float = 1.0) -> Callable[[DropSetting, Knots], Dr
     return add
 
 
-def _add_force_of_depth(
-    pressure: Callable[[float], float], unit: float | None = 1e-3
+def _add_force(
+    key: str, unit: float | None, pressure: Callable[[float], float] = lambda radius: 1.0
 ) -> Callable[[DropSetting, Knots], DropSetting]:
-    """What adds a force over depth. pressure : Pa on the cross-section that one unit of the force is, of the tip's radius in m;
-    unit : of the depth, m, None for the tip's radius."""
+    """What adds a force to the table that the setting's key holds. unit : of what the table goes with, None for the tip's radius;
+    pressure : on the cross-section that one unit of the force is, of the tip's radius in m."""
 
     def add(setting: DropSetting, table: Knots) -> DropSetting:
         radius = setting.projectile.tip_radius
         force, length = pressure(radius) * _section(setting), unit or radius
         table = tuple((knot * length, value * force) for knot, value in table)
-        return setting.replace(force_of_depth=combine(setting.force_of_depth, table))
+        return setting.replace(**{key: combine(getattr(setting, key), table)})
 
     return add
-
-
-def _add_pressure_of_speed(setting: DropSetting, table: Knots) -> DropSetting:
-    area = _section(setting)
-    return setting.replace(
-        force_of_speed=combine(setting.force_of_speed, tuple((knot, value * area) for knot, value in table))
-    )
 
 
 def _add_mass(key: str) -> Callable[[DropSetting, Knots], DropSetting]:
@@ -170,22 +166,23 @@ LAW_PLACES = {
         LawPlace(
             "force of depth", "depth", "tip radii", "Pa",
             "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
-            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_force_of_depth(lambda a: 1.0, None),
+            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_force("force_of_depth", None),
         ),
         LawPlace(
             "force of depth in mm", "depth", "mm", "Pa",
             "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
-            100.0, -math.inf, "", 400.0, IN_MM, _add_force_of_depth(lambda a: 1.0),
+            100.0, -math.inf, "", 400.0, IN_MM, _add_force("force_of_depth", 1e-3),
         ),
         LawPlace(
             "force alike for all tips", "depth", "mm", "mN",
             "a force upwards, alike for all tips, of", "force upwards", "mN",
-            100.0, -math.inf, "", 0.3, (0.0, 1.0), _add_force_of_depth(lambda a: 1e-3 / (math.pi * a**2)),
+            100.0, -math.inf, "", 0.3, (0.0, 1.0),
+            _add_force("force_of_depth", 1e-3, lambda a: 1e-3 / (math.pi * a**2)),
         ),
         LawPlace(
             "force on the rim", "depth", "mm", "N/m",
             "a force upwards on the tip, over its circumference, of", "force upwards", "N/m",
-            100.0, -math.inf, "", 0.1, (0.0, 1.0), _add_force_of_depth(lambda a: 2.0 / a),
+            100.0, -math.inf, "", 0.1, (0.0, 1.0), _add_force("force_of_depth", 1e-3, lambda a: 2.0 / a),
         ),
         LawPlace(
             "strength of depth", "depth where dust lay", "mm", "1",
@@ -195,7 +192,23 @@ LAW_PLACES = {
         LawPlace(
             "force of speed", "speed", "m/s", "Pa",
             "a force against the motion, over the tip's cross-section, of", "force against the motion", "Pa",
-            2.0, 0.0, "pushes along the motion", 400.0, (0.0, 0.1, 0.3, 0.6, 1.2), _add_pressure_of_speed,
+            2.0, 0.0, "pushes along the motion", 400.0, (0.0, 0.1, 0.3, 0.6, 1.2), _add_force("force_of_speed", 1.0),
+        ),
+        LawPlace(
+            "viscosity of depth", "depth", "tip radii", "Pa s/m",
+            "a force against the motion, over the tip's cross-section, that is its speed times", "force over speed", "Pa s/m",
+            12.0, 0.0, "pushes along the motion", 400.0, (0.0, 1.0, 4.0), _add_force("viscosity_of_depth", None),
+        ),
+        LawPlace(
+            "drag of depth", "depth", "tip radii", "Pa s²/m²",
+            "a force against the motion, over the tip's cross-section, that is the square of its speed times",
+            "force over the square of the speed", "Pa s²/m²",
+            12.0, 0.0, "pushes along the motion", 600.0, (0.0, 1.0, 4.0), _add_force("drag_of_depth", None),
+        ),
+        LawPlace(
+            "force of time", "time since contact", "ms", "Pa",
+            "a force against the motion, over the tip's cross-section, of", "force against the motion", "Pa",
+            30.0, 0.0, "pushes along the motion", 400.0, (0.0, 1.0, 2.0, 4.0), _add_force("force_of_time", 1e-3),
         ),
         LawPlace(
             "mass of depth", "depth", "tip radii", "1",
@@ -205,7 +218,7 @@ LAW_PLACES = {
         LawPlace(
             "gathered mass of depth", "depth", "tip radii", "1",
             "dust that lies still until the tip takes it along, over the mass of the projectile, of", "mass that is gathered",
-            "%", 12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass("gathered_of_depth"),
+            "%", 12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass("gathered_of_depth"), rising=True,
         ),
         LawPlace(
             "strength of size", "radius of the tip", "mm", "1",

@@ -15,9 +15,8 @@
 
 Of another law than the dust's, ``law = "von_mises"`` and what is calibrated of it (``cohesion_Pa``) stand under [material].
 
-Under [law] stand coefficients of terms (effects/terms/), and tables at knots: ``strength_of_filling_factor`` (filling factor,
-strength over what p_m gives minus one), ``force_of_depth`` (tip radii, Pa), ``force_of_speed`` (m/s, Pa), ``mass_of_depth``
-and ``gathered_mass_of_depth`` (tip radii, share of the projectile's mass).
+Under [law] stand coefficients of terms (effects/terms/), and tables at knots, as ``force_of_depth`` (tip radii, Pa): one for
+every place of effects/law_places.py, its name with underscores.
 
 ``labsim diagnose`` writes it, ``labsim simulate --model`` and ``labsim calibrate --model`` take it, people may write it.
 """
@@ -137,6 +136,10 @@ def _read_law(path: Path, table: Mapping[str, Any]) -> Law:
             if value < place.least:
                 said = f"{_show(value, place.value_unit)} at {_show(knot, place.unit)} {place.breaks}"
                 raise EffectError(path, f"law.{key}", f"{said}; write {place.least:g} or more")
+        for (_, before), (knot, after) in itertools.pairwise(tables[-1][1]) if place.rising else ():
+            if after < before:
+                said = f"falls to {_show(after, place.value_unit)} at {_show(knot, place.unit)}, which pushes along the motion"
+                raise EffectError(path, f"law.{key}", f"{said}; write {before:g} or more there")
     return Law(tuple(terms), tuple(tables))
 
 

@@ -79,9 +79,13 @@ class DropSetting:
         Plastic shear strain and factor on Σ, or on Y.
     strength_of_depth : tuple of (float, float)
         m below the surface, of undisturbed dust, and factor on the Σ that this dust keeps.
-    force_of_depth, force_of_speed, mass_of_depth, gathered_of_depth : tuple of (float, float)
-        m and N upwards; m/s and N against the motion; m and kg of dust that move with the tip: it has the tip's speed when it
-        sticks, or lies still, so that the tip gives it its momentum.
+    force_of_depth, force_of_speed, force_of_time : tuple of (float, float)
+        m and N upwards; m/s, or s since the start, and N against the motion.
+    viscosity_of_depth, drag_of_depth : tuple of (float, float)
+        m and what times the speed, N s/m, or times its square, N s²/m², is a force against the motion.
+    mass_of_depth, gathered_of_depth : tuple of (float, float)
+        m and kg of dust that move with the tip: it has the tip's speed when it sticks, or lies still, so that the tip gives it
+        its momentum.
     """
 
     projectile: Projectile
@@ -114,6 +118,15 @@ class DropSetting:
     force_of_speed: tuple[
         tuple[float, float], ...
     ] = ()  # (speed m/s, force N against the motion), linear between
+    force_of_time: tuple[
+        tuple[float, float], ...
+    ] = ()  # (time s, force N against the motion), linear between
+    viscosity_of_depth: tuple[
+        tuple[float, float], ...
+    ] = ()  # (depth m, N s/m against the motion), linear between
+    drag_of_depth: tuple[
+        tuple[float, float], ...
+    ] = ()  # (depth m, N s²/m² against the motion), linear between
     mass_of_depth: tuple[
         tuple[float, float], ...
     ] = ()  # (depth m, kg of dust that move with the tip), linear between

@@ -88,14 +88,20 @@ class Numbers(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """What acts on the projectile besides the dust in the simulation: forces of the immersed length, of depth, of speed; dust
-    that sticks to it; and a driver, where there is a path."""
+    """What acts on the projectile besides the dust in the simulation: forces of the immersed length, of depth, of speed, of time,
+    of depth and speed; dust that sticks to it; and a driver, where there is a path."""
 
     side_friction: float  # N/m
     depth_knots: FloatArray
     depth_force: FloatArray
     speed_knots: FloatArray
     speed_force: FloatArray
+    time_knots: FloatArray  # s
+    time_force: FloatArray
+    viscosity_knots: FloatArray  # m
+    viscosity: FloatArray  # N s/m
+    drag_knots: FloatArray  # m
+    drag: FloatArray  # N s²/m²
     mass_knots: FloatArray  # m
     stuck: FloatArray  # kg
     gathered_knots: FloatArray  # m

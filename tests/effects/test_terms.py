@@ -40,7 +40,9 @@ def test_every_term_is_what_its_page_says(name):
     assert low <= 0.0 <= high
     assert add_term(SETTING, term, 0.0) is SETTING
     if term.acts.least == 0.0:
-        assert np.all(min(max(c, -1e9), 1e9) * values.min() >= 0 for c in (low, high))
+        assert all(min(max(c, -1e9), 1e9) * values.min() >= 0 for c in (low, high))
+    if term.acts.rising:
+        assert all(np.all(min(max(c, -1e9), 1e9) * np.diff(values) >= 0) for c in (low, high))
     if "strength" in term.place and term.acts.simulated:
         changed = add_term(SETTING, term, max(low, -100.0))
         [hardest] = [
@@ -62,6 +64,20 @@ def test_a_drag_is_the_tip_s_section_times_its_formula():
     speed, force = np.array(table).T
     np.testing.assert_allclose(force, 100.0 * speed**2 * AREA, rtol=1e-12)
     assert speed[-1] > SETTING.impact_speed
+
+
+def test_a_drag_of_the_shaft_goes_with_depth_and_speed():
+    depth, drag = np.array(add_term(SETTING, TERMS["shaft_drag"], 300.0).drag_of_depth).T
+    np.testing.assert_allclose(drag, 300.0 * depth / 5e-4 * AREA, rtol=1e-12)
+    time, force = np.array(add_term(SETTING, TERMS["time_ramp"], 70.0).force_of_time).T
+    np.testing.assert_allclose(force, 70.0 * 1e3 * time * AREA, rtol=1e-12)
+
+
+def test_mass_that_is_gathered_grows_with_depth():
+    """Where it fell, dust that lies still would push the tip along."""
+    falling = replace(TERMS["gathered_mass"], shape=lambda z: np.exp(-z))
+    assert falling.limits == (0.0, 0.0)
+    assert TERMS["gathered_mass"].limits == (0.0, math.inf)
 
 
 def test_forces_add_up_and_factors_multiply():
@@ -122,6 +138,11 @@ def test_a_law_survives_its_file_and_reaches_the_drop(tmp_path):
         ("force_of_depth = 3", "is no table"),
         ("mass_of_depth = [[0.0, 0.0], [1.0, -3.0]]", "takes mass away"),
         ("strength_of_filling_factor = [[0.15, 0.0], [0.3, -1.0]]", "leaves no strength"),
+        (
+            "gathered_mass_of_depth = [[0.0, 1.0], [1.0, 0.0]]",
+            "falls to 0 at 1 tip radii, which pushes along",
+        ),
+        ("drag_of_depth = [[0.0, 0.0], [1.0, -1.0]]", "pushes along the motion"),
     ],
 )
 def test_what_is_no_law_is_refused(tmp_path, text, said):

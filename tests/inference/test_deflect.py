@@ -32,10 +32,11 @@ def fall(setting: DropSetting) -> Motion:
         table = getattr(setting, key)
         return float(np.interp(at, *np.transpose(table))) if table else 0.0
 
-    def accelerate(_: float, state: np.ndarray) -> tuple[float, float]:
+    def accelerate(t: float, state: np.ndarray) -> tuple[float, float]:
         z, v = state
         push = 1e-4 + k * z + c * v * v + read("force_of_depth", z)
-        push += read("force_of_speed", v) * v / (v + 1e-3)
+        push += (read("force_of_speed", v) + read("force_of_time", t)) * v / (v + 1e-3)
+        push += read("viscosity_of_depth", z) * v + read("drag_of_depth", z) * v * v
         here, below = (read("gathered_of_depth", at) for at in (z, z + 1e-7))
         push += (below - here) / 1e-7 * v * v
         return v, setting.gravity - push / (mass + here + read("mass_of_depth", z))
@@ -61,6 +62,9 @@ LAWS = {
     "force of depth": ("force_of_depth", ((0.0, 0.0), (RADIUS, 3e-4), (2 * RADIUS, 0.0))),
     "a pull": ("force_of_depth", ((0.0, -5e-5), (1.0, -5e-5))),
     "force of speed": ("force_of_speed", tuple((v, 3e-4 * v**1.5) for v in np.linspace(0, 1.2, 25))),
+    "force of time": ("force_of_time", ((0.0, 0.0), (2e-3, 1e-4))),
+    "viscosity of depth": ("viscosity_of_depth", ((0.0, 0.0), (2 * RADIUS, 4e-4))),
+    "drag of depth": ("drag_of_depth", ((0.0, 0.0), (2 * RADIUS, 8e-4))),
     "mass": ("mass_of_depth", ((0.0, 0.0), (2 * RADIUS, 4e-7))),
     "mass that lay still": ("gathered_of_depth", ((0.0, 0.0), (2 * RADIUS, 4e-7))),
 }

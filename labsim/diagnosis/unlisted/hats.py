@@ -67,11 +67,15 @@ class FreeLaw:
 
 def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
     """The laws that are simulated, with the hats that these drops and scans reach."""
-    deepest, deepest_mm, fastest = 0.0, 0.0, 0.0
+    deepest, deepest_mm, fastest, longest = 0.0, 0.0, 0.0, 0.0
     for observation, nuisances in zip(problem.observations, fit.nuisances, strict=True):
         if isinstance(observation, Tracks):
             instants = observation.instants(nuisances)
-            fastest = max([fastest, *(math.exp(instant.log_speed) for instant in instants)])
+            speeds = [math.exp(instant.log_speed) for instant in instants]
+            fastest = max([fastest, *speeds])
+            # ms, slowed evenly
+            stops = [2e3 * model.deepest / v for model, v in zip(observation.models, speeds, strict=True)]
+            longest = max([longest, *stops])
             deepest = max([deepest, *(model.deepest / model.radius for model in observation.models)])
             deepest_mm = max([deepest_mm, *(1e3 * model.deepest for model in observation.models)])
         elif isinstance(observation, CompactedZones):
@@ -79,6 +83,7 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             deepest = max([deepest, *(each.map.tip_depth / each.radius for each in observed)])
             deepest_mm = max([deepest_mm, *(1e3 * each.map.tip_depth for each in observed)])
             fastest = max(fastest, math.exp(float(nuisances.max())))
+            longest = max(longest, 2.0 * deepest_mm / fastest)
     radii, laws = _list_radii(problem), []
     for place in LAW_PLACES.values():
         if place.over == "filling factor":
@@ -92,7 +97,7 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             grid = tuple(depth for depth in depths if depth == 0.0 or depth >= THIN * radii[0])
             laws.append(FreeLaw(place, grid, grid, (0.0, deepest_mm)))
         elif place.simulated:
-            most = {"tip radii": deepest, "m/s": fastest}.get(place.unit, place.reach)
+            most = {"tip radii": deepest, "m/s": fastest, "ms": longest}.get(place.unit, place.reach)
             # nought where nothing has moved: a force that does not change with speed is one of depth, a strength that does not
             # with strain is p_m
             reached = _reached(place.knots, most)[int(place.least > -math.inf) :]
@@ -174,7 +179,7 @@ def add_terms(
             largest = 1.0
         else:
             continue
-        if largest > 0.0:
+        if largest > 0.0 and term.limits[0] < term.limits[1]:
             terms[name], units[name] = term, term.acts.scale / largest
     effects = {name: make_effect(term, units[name]) for name, term in terms.items()}
     return replace(problem, effects={**problem.effects, **effects}), terms, units

@@ -54,8 +54,9 @@ class Term:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Of c: no force along the motion, for that gains energy on a closed way, no mass below nought, and no strength below
-        what a law must leave, as far as drops come. A force of depth does no work on a closed way and may have either sign."""
+        """Of c: no force along the motion, for that gains energy on a closed way, no mass below nought, none that is gathered and
+        grows less, which would push along the motion, and no strength below what a law must leave, as far as drops come. A force
+        of depth does no work on a closed way and may have either sign."""
         least = self.acts.least
         if self.acts.see:
             return least, self.acts.most
@@ -63,7 +64,12 @@ class Term:
             return -math.inf, math.inf
         values = self.shape(self.sample(0.0, self.acts.reach))
         highest, lowest = float(values.max()), float(values.min())
-        return (least / highest if highest > 0 else -math.inf, least / lowest if lowest < 0 else math.inf)
+        low = least / highest if highest > 0 else -math.inf
+        high = least / lowest if lowest < 0 else math.inf
+        if self.acts.rising:
+            low = 0.0 if (np.diff(values) > 0).any() else low
+            high = 0.0 if (np.diff(values) < 0).any() else high
+        return low, high
 
 
 @dataclass(frozen=True)

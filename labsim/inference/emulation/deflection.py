@@ -21,7 +21,15 @@ from ...records import FloatArray
 from ...runs.parts import Motion
 from ...sph import DropSetting
 
-FORCES = ("force_of_depth", "force_of_speed", "mass_of_depth", "gathered_of_depth")
+FORCES = (
+    "force_of_depth",
+    "force_of_speed",
+    "force_of_time",
+    "viscosity_of_depth",
+    "drag_of_depth",
+    "mass_of_depth",
+    "gathered_of_depth",
+)
 STEPS, LONGEST = 150, 4  # a stopping time; stopping times without the law within which a drop has to stop
 BEYOND = 0.44  # of ln v0, past the slowest and the fastest run: farther away nothing is known
 SAMPLED, DEEPER = 2000, 2.0  # places at which a law is known; how far down, in depths of the deepest run
@@ -50,7 +58,12 @@ def deflect(runs: Sequence[Motion], changed: Sequence[Sequence[DropSetting]]) ->
     paths = _Paths(runs)
     flat = [setting for settings in changed for setting in settings]
     plain = [run.setting for run in runs] * len(changed)
-    law = _Law(flat, plain, DEEPER * max(run.penetration_depth for run in runs))
+    law = _Law(
+        flat,
+        plain,
+        DEEPER * max(run.penetration_depth for run in runs),
+        LONGEST * max(run.stopping_time for run in runs),
+    )
     n, k = len(flat), len(runs)
     start = np.tile(paths.log_speeds, len(changed))
     at, log_speed, time = np.zeros(n), start.copy(), np.zeros(n)
@@ -59,21 +72,25 @@ def deflect(runs: Sequence[Motion], changed: Sequence[Sequence[DropSetting]]) ->
     logs: list[tuple[FloatArray, FloatArray, FloatArray]] = [(time.copy(), np.zeros(n), np.exp(start))]
     low, high = paths.log_speeds[0] - BEYOND, paths.log_speeds[-1] + BEYOND
 
-    def move(at: FloatArray, log_speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def move(
+        at: FloatArray, log_speed: FloatArray, time: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Rates of τ and l, depths and speeds."""
         inside, known = np.minimum(at, 1.0), np.clip(log_speed, low, high)
         stop, (z, z_at, z_l), (v, v_at, v_l) = paths.find_derivatives(inside, known)
-        push = law.accelerate(z, np.maximum(v, 0.0), v_at / stop)
+        push = law.accelerate(z, np.maximum(v, 0.0), time, v_at / stop)
         rigid = z_at * v_l - z_l * v_at
         return 1.0 / stop - z_l * push / rigid, z_at * push / rigid, z, v
 
-    rate_at, rate_l, _, _ = move(at, log_speed)
+    rate_at, rate_l, _, _ = move(at, log_speed, time)
     for _ in range(LONGEST * STEPS):
-        rate_at, rate_l, _, _ = move(at + 0.5 * step * rate_at, log_speed + 0.5 * step * rate_l)
+        rate_at, rate_l, _, _ = move(
+            at + 0.5 * step * rate_at, log_speed + 0.5 * step * rate_l, time + 0.5 * step
+        )
         ends = at + step * rate_at >= 1.0
         own = np.where(ends, (1.0 - at) / np.maximum(rate_at, 1e-300), step) * going
         at, log_speed, time = at + own * rate_at, log_speed + own * rate_l, time + own
-        rate_at, rate_l, z, v = move(at, log_speed)
+        rate_at, rate_l, z, v = move(at, log_speed, time)
         logs.append((time.copy(), z, v))
         going &= ~ends & (log_speed > low) & (log_speed < high) & (at > -1.0)
         if not going.any():
@@ -158,14 +175,22 @@ class _Paths:
 class _Law:
     """What changed settings add to the plain ones' acceleration, of many drops at once; tables sampled evenly."""
 
-    def __init__(self, changed: Sequence[DropSetting], plain: Sequence[DropSetting], deepest: float) -> None:
+    def __init__(
+        self, changed: Sequence[DropSetting], plain: Sequence[DropSetting], deepest: float, longest: float
+    ) -> None:
         self.mass = np.array([setting.projectile.mass for setting in changed])
         self.gravity = np.array([setting.gravity for setting in changed])
         fastest = 2.0 * max(setting.impact_speed for setting in changed)
-        self.ends = deepest, fastest
-        depths, speeds = np.linspace(0.0, deepest, SAMPLED), np.linspace(0.0, fastest, SAMPLED)
-        self.force = _tabulate(changed, "force_of_depth", depths) - _tabulate(plain, "force_of_depth", depths)
-        self.drag = _tabulate(changed, "force_of_speed", speeds) - _tabulate(plain, "force_of_speed", speeds)
+        self.ends = deepest, fastest, longest
+        depths, speeds, times = (np.linspace(0.0, end, SAMPLED) for end in self.ends)
+
+        def more(key: str, places: FloatArray) -> FloatArray:
+            return _tabulate(changed, key, places) - _tabulate(plain, key, places)
+
+        self.force, self.viscosity, self.drag = (
+            more(key, depths) for key in ("force_of_depth", "viscosity_of_depth", "drag_of_depth")
+        )
+        self.of_speed, self.of_time = more("force_of_speed", speeds), more("force_of_time", times)
         gathered, gathered_before = (
             _tabulate(settings, "gathered_of_depth", depths) for settings in (changed, plain)
         )
@@ -173,11 +198,15 @@ class _Law:
         self.stuck_before = gathered_before + _tabulate(plain, "mass_of_depth", depths)
         self.growth = np.gradient(gathered - gathered_before, depths, axis=1)
 
-    def accelerate(self, depth: FloatArray, speed: FloatArray, before: FloatArray) -> FloatArray:
+    def accelerate(
+        self, depth: FloatArray, speed: FloatArray, time: FloatArray, before: FloatArray
+    ) -> FloatArray:
         """Acceleration (m/s²) more than ``before``, of the plain drop there."""
-        down, fast = self.ends
-        force = _read(self.force, depth / down) + _read(self.drag, speed / fast) * speed / (speed + REST)
-        force += _read(self.growth, depth / down) * speed**2
+        down, fast, long = self.ends
+        force = _read(self.of_speed, speed / fast) + _read(self.of_time, time / long)
+        force *= speed / (speed + REST)
+        force += _read(self.force, depth / down) + _read(self.viscosity, depth / down) * speed
+        force += (_read(self.drag, depth / down) + _read(self.growth, depth / down)) * speed**2
         resisted = (self.mass + _read(self.stuck_before, depth / down)) * (self.gravity - before) + force
         return self.gravity - before - resisted / (self.mass + _read(self.stuck, depth / down))
 

@@ -30,6 +30,7 @@ from .projectile import (
 )
 
 EIGHT = np.uint64(WIDTH)
+REST = 1.0e-3  # m/s: forces that fade at rest fade below it
 BLOCK = np.uint64(
     128
 )  # particles between two sums over neighbours at a time; unsigned, or no loop is vectorised
@@ -138,19 +139,21 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
             s.fx[i] += s.push_x[i]
             s.fz[i] += s.push_z[i]
         depth = -body[TIP]
+        speed = -body[SPEED]
+        way = speed / (abs(speed) + REST)  # against which friction pushes
         pushed = 0.0
         if outside.side_friction > 0.0:
-            speed = -body[SPEED]
-            pushed += outside.side_friction * max(depth, 0.0) * speed / (abs(speed) + 1.0e-3)
+            pushed += outside.side_friction * max(depth, 0.0) * way
         if outside.depth_knots.size > 0:
             pushed += interpolate(depth, outside.depth_knots, outside.depth_force)
         if outside.speed_knots.size > 0:
-            speed = -body[SPEED]
-            pushed += (
-                interpolate(abs(speed), outside.speed_knots, outside.speed_force)
-                * speed
-                / (abs(speed) + 1.0e-3)
-            )
+            pushed += interpolate(abs(speed), outside.speed_knots, outside.speed_force) * way
+        if outside.time_knots.size > 0:
+            pushed += interpolate(body[TIME], outside.time_knots, outside.time_force) * way
+        if outside.viscosity_knots.size > 0:
+            pushed += interpolate(depth, outside.viscosity_knots, outside.viscosity) * speed
+        if outside.drag_knots.size > 0:
+            pushed += interpolate(depth, outside.drag_knots, outside.drag) * abs(speed) * speed
         if (outside.mass_knots.size > 0 or outside.gathered_knots.size > 0) and not led:
             # one more body, whose push on the projectile is this. Dust that sticks has its speed when it does
             stuck = (
@@ -159,7 +162,7 @@ def advance(s, own, lists, lines, numbers, outside, constants, tables, log, body
             if outside.gathered_knots.size > 0:  # (m v)' = F: dust that lay still takes v² dm/dz
                 here = interpolate(depth, outside.gathered_knots, outside.gathered)
                 below = interpolate(depth + 1.0e-3 * spacing, outside.gathered_knots, outside.gathered)
-                pushed += (below - here) / (1.0e-3 * spacing) * max(-body[SPEED], 0.0) ** 2
+                pushed += (below - here) / (1.0e-3 * spacing) * max(speed, 0.0) ** 2
                 stuck += here
             share = numbers.body_mass / max(numbers.body_mass + stuck, 0.1 * numbers.body_mass)
             pushed = share * (force + pushed) - force
