@@ -19,7 +19,7 @@ from benchmarks.campaigns.labelled import measure_campaigns
 from labsim.campaign import read_campaign
 from labsim.inference.calibrate import calibrate
 from labsim.inference.observations.static_tests import fit_strength
-from labsim.inference.scatter import set_terms
+from labsim.inference.scatter import set_error_budget
 
 KIND = "compression_omnidirectional"
 NOMINAL = {"delta": 0.58, "phi_2": 0.58}
@@ -41,7 +41,7 @@ def measure(folder: Path) -> Found:
     # the causes are stated to the calibration, their sizes are not
     causes = json.loads((folder.parent / "truth.json").read_text())[folder.name]["cause"].split(" + ")
     tests = [test for test in campaign.strength_tests if test.kind == KIND]
-    curve = fit_strength(KIND, tests, set_terms(campaign).scatter)
+    curve = fit_strength(KIND, tests, set_error_budget(campaign).scatter)
     found = calibrate(campaign, ("p_m", *causes), workers=1).posterior
     free = {"delta": "strength_slope.delta", "phi_2": "strength_ceiling.phi_2"}
     beside = {

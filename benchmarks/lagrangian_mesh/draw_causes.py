@@ -27,7 +27,7 @@ from labsim.effects import Effect
 from labsim.errors import LabsimError
 from labsim.inference.calibrate import prepare
 from labsim.inference.fits.fitting import fit_hypothesis
-from labsim.inference.scatter import set_terms
+from labsim.inference.scatter import set_error_budget
 from labsim.records import Campaign
 from labsim.runs.store import RunStore
 
@@ -81,7 +81,7 @@ def hide(name: str, effect: Effect, size: float, rng: np.random.Generator) -> tu
 
 def find_sizes(campaign: Campaign) -> dict[str, tuple[Effect, float]]:
     """Of every cause: the effect and the amplitude that is SIGMAS standard deviations where it is small."""
-    problem, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+    problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
     found = screen(problem, nominal, np.random.default_rng(1))
     signal = {score.name: score.signal for score in found.scores}
     return {
@@ -99,7 +99,7 @@ def find_strength(plan: dict, name: str, amplitude: float, folder: Path) -> floa
         campaign = read_campaign(Path(made) / label)
         low, high = campaign.p_m_range
         campaign = replace(campaign, p_m_range=(low / ROOM, high * ROOM))
-        problem, nominal = prepare(campaign, RunStore(), workers=1, terms=set_terms(campaign))
+        problem, nominal = prepare(campaign, RunStore(), workers=1, budget=set_error_budget(campaign))
         # from the truth: from the nominal p_m, far off where the cause is strong, some fits ended halfway
         found = fit_hypothesis(problem, (name,), (math.log(plan["pm"]), {name: amplitude}))
         return math.sqrt(max(nominal.chi_square - found.chi_square, 0.0))

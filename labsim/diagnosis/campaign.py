@@ -308,7 +308,9 @@ def diagnose_campaign(
     untestable = list_untestable(problem, about)
     learned = None
     if found.verdict.word == "unknown":
-        learned = learn_law(problem, nominal, found.unknown, held_nominal)
+        learned = learn_law(
+            problem, nominal, found.unknown, held_nominal, found.leading if found.rivals else None
+        )
     doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]

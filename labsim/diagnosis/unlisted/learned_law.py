@@ -42,6 +42,7 @@ MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of a place, likewise
 # what a layer changes has a peak where drops end in it, which few speeds miss: all are simulated
 PEAKED = "strength of depth"
+MOST_PARTS = 3  # terms, or terms and listed causes, of a formula
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
@@ -51,7 +52,8 @@ ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas ap
 
 @dataclass(frozen=True)
 class Formula:
-    """Some terms as a fit of their own runs. gain : over the nominal model, on drops held out of both fits."""
+    """Some terms as a fit of their own runs, beside listed causes where they do not explain the data alone. gain : over the
+    nominal model, on drops held out of both fits."""
 
     terms: tuple[Term, ...]
     fit: Fit
@@ -64,7 +66,19 @@ class Formula:
 
     @property
     def sigma(self) -> FloatArray:
-        return np.sqrt(np.diag(self.fit.covariance)[1:])
+        return np.array([self.error(term.name) for term in self.terms])
+
+    @property
+    def causes(self) -> Hypothesis:
+        """Names of the listed causes beside the terms."""
+        names = {term.name for term in self.terms}
+        return tuple(name for name in self.fit.hypothesis if name not in names)
+
+    def error(self, name: str) -> float:
+        """Standard deviation of the amplitude of a term or cause."""
+        return math.sqrt(
+            self.fit.covariance[1 + self.fit.hypothesis.index(name), 1 + self.fit.hypothesis.index(name)]
+        )
 
 
 @dataclass(frozen=True)
@@ -86,12 +100,14 @@ class LearnedLaw:
         return [each for each in self.formulas[1:] if each.fit.evidence > self.best.fit.evidence - ALIKE]
 
 
-def learn_law(problem: Problem, nominal: Fit, unknown: UnknownFit, before: HeldOut) -> LearnedLaw | None:
+def learn_law(
+    problem: Problem, nominal: Fit, unknown: UnknownFit, before: HeldOut, leading: Fit | None = None
+) -> LearnedLaw | None:
     """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
     and gives held-out drops a higher probability, the best of them where its fit is repeated without them too; None where no law
     was left free.
 
-    before : the nominal model's predictions of held-out drops.
+    before : the nominal model's predictions of held-out drops. leading : the listed cause, or pair, that explains most.
     """
     tangents = unknown.tangents
     if tangents is None:
@@ -103,14 +119,15 @@ def learn_law(problem: Problem, nominal: Fit, unknown: UnknownFit, before: HeldO
     chosen = [names for names, _ in choose_formulas(weighed, terms)]
     ranked = dict.fromkeys([names[0] for names, _ in weighed if len(names) == 1] + list(terms))
     ordered = {name: units[name] for name in ranked}
-    fits = fit_formulas(free, nominal, chosen, ordered, list_open_places(unknown))
+    fits = fit_formulas(free, nominal, chosen, ordered, list_open_places(unknown), leading)
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
             held_out = predict_held_out(free, fit)
             gain = measure_gain(before, held_out)
             if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
-                formulas.append(Formula(tuple(terms[name] for name in fit.hypothesis), fit, held_out, gain))
+                named = tuple(terms[name] for name in fit.hypothesis if name in terms)
+                formulas.append(Formula(named, fit, held_out, gain))
     if not formulas:
         return None
     formulas.sort(key=lambda each: -each.fit.evidence)
@@ -128,10 +145,11 @@ def fit_formulas(
     chosen: Sequence[Hypothesis],
     units: Mapping[str, float],
     open_places: Collection[str] = (),
+    leading: Fit | None = None,
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
     them among runs about themselves. units : of all terms, those first that are weighed first; open_places : whose forms are
-    tried in any case."""
+    tried in any case; leading : what of the listed causes explains most, which a term may stand beside."""
     simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
     sparse: list[Fit] = []
     for names in chosen:
@@ -149,7 +167,38 @@ def fit_formulas(
         near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    return fit_siblings(problem, nominal, fits, sparse, units, open_places)
+    fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
+    while not _explains(fits or [nominal]):
+        further = fit_further(problem, [*fits[:1], *([leading] if leading else [])], [*fits, *sparse])
+        if not further:
+            break
+        fits = sorted(take_better([*fits, *further]), key=lambda fit: -fit.evidence)
+    return fits
+
+
+def fit_further(problem: Problem, bases: Sequence[Fit], known: Sequence[Fit]) -> list[Fit]:
+    """Fits with one term more than each of ``bases`` has, of those that are LEAST_GAIN ahead of it and of all others: the best
+    single term of every place is tried on few runs, and what comes furthest has runs of its own. MOST_PARTS at most.
+
+    known : fits of single terms, from which these begin.
+    """
+    singles: dict[str, Fit] = {}
+    for fit in sorted(known, key=lambda fit: -fit.evidence):
+        if len(fit.hypothesis) == 1 and fit.hypothesis[0] in list_terms():
+            singles.setdefault(list_terms()[fit.hypothesis[0]].place, fit)
+    top = max(fit.evidence for fit in (*bases, *known))
+    found: list[Fit] = []
+    for base in bases:
+        if len(base.hypothesis) >= MOST_PARTS:
+            continue
+        sparse: list[Fit] = []
+        for (name,) in (fit.hypothesis for fit in singles.values()):
+            if name not in base.hypothesis:
+                names = (*base.hypothesis, name)
+                sparse += _fit(problem, names, (base.log_p_m, base.values), base, sparse=True)
+        for start in sorted(sparse, key=lambda fit: -fit.evidence)[:MOST_SIBLINGS]:
+            found += _fit(problem, start.hypothesis, (start.log_p_m, start.values), start)
+    return [fit for fit in found if fit.evidence > top + LEAST_GAIN]
 
 
 def fit_anew(
