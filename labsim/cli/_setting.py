@@ -20,7 +20,7 @@ from ..effects import (
     reference_campaign,
 )
 from ..effects.model import apply_material
-from ..effects.terms import apply_law
+from ..effects.terms import apply_law, list_terms
 from ..errors import CampaignError, LabsimError
 from ..inference.published.figures import impact_speed
 from ..inference.published.planar import planar_setting
@@ -56,7 +56,7 @@ class Asked:
 
 
 def make_setting(asked: Asked) -> tuple[DropSetting, list[str]]:
-    """The setting, and a line about each effect of --model that acts on the measurement only. Raises LabsimError."""
+    """The setting, and a line about each effect or term of --model that acts on the measurement only. Raises LabsimError."""
     read = read_campaign(asked.campaign) if asked.campaign is not None else None
     drop = _choose_drop(read, asked.drop)
     known = list_effects(read)
@@ -257,7 +257,7 @@ def _extend(
     chosen: Drop | None,
     known: dict[str, Effect],
 ) -> tuple[DropSetting, list[str]]:
-    """The setting with the model's effects, and a line about each that acts on the measurement only."""
+    """The setting with the model's effects and its law, and a line about each part that acts on the measurement only."""
     if read is None or chosen is None:
         usual = reference_campaign()
         drop = replace(usual.drops[0], projectile=setting.projectile)
@@ -268,9 +268,10 @@ def _extend(
     else:
         place = list_places(read)[chosen.name]
     check_model(model, read, known, file)
+    seen = [name for name, _ in model.effects if not known[name].affects_simulation]
+    seen += [name for name, _ in model.law.terms if list_terms()[name].acts.add is None]
     lines = [
         f"{name} acts on what is measured, not on the drop; this run is the true motion without it"
-        for name, _ in model.effects
-        if not known[name].affects_simulation
+        for name in seen
     ]
     return apply_law(apply_effects(setting, model.effects, place, known), model.law), lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -20,9 +21,12 @@ from labsim.effects import (
     reference_campaign,
     write_model,
 )
+from labsim.effects.law_places import LAW_PLACES
+from labsim.effects.terms import Law, apply_law, list_terms
 from labsim.errors import EffectError
-from labsim.records import Projectile
+from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
+from labsim.sph import simulate as run_drop
 
 FULL = Model(
     1012.3456789012345,
@@ -151,6 +155,56 @@ def test_simulate_says_what_is_not_of_the_drop(tmp_path: Path, capsys: pytest.Ca
     path.write_text("[material]\np_m_Pa = 900\n[effects.gravity]\ng = 9.81\n")
     assert call("simulate", *options, "--model", str(path), "--spacing-um", "125") == 2
     assert "effects.gravity: does not apply here: the nominal model has gravity" in capsys.readouterr().err
+
+
+COARSE = DropSetting(
+    # the drop that simulate makes where nothing is stated
+    Projectile("hemisphere", 5e-4, 2540.0 * 4.0 / 3.0 * math.pi * 5e-4**3),
+    0.65,
+    Material(p_m=900.0),
+    spacing=125e-6,
+)
+LAWS = {  # one term of every place that a run knows, as large as a campaign may show it
+    "hardening": 0.5,
+    "shear_damage": 0.8,
+    "shear_hardening": 0.5,
+    "depth_spring": 150.0,
+    "film_at_0_5_mm": 200.0,
+    "pull": 0.1,
+    "rim_pull": 0.04,
+    "layer_at_0_5_mm": 0.8,
+    "inertial_drag": 300.0,
+    "shaft_drag": 400.0,
+    "shaft_viscosity": 200.0,
+    "time_ramp": 80.0,
+    "stuck_mass": 0.15,
+    "gathered_mass": 0.15,
+    "size_power": 0.4,
+}
+
+
+def test_a_law_of_every_place_is_at_work_in_simulate(tmp_path: Path) -> None:
+    """The run is that of the setting which the API gives, and not the one without the law."""
+    terms = list_terms()
+    assert {terms[name].place for name in LAWS} == {p.name for p in LAW_PLACES.values() if p.add}
+    plain = simulate(tmp_path, "[material]\np_m_Pa = 900\n")["penetration_depth_m"]
+    for name, c in LAWS.items():
+        found = simulate(tmp_path, f"[material]\np_m_Pa = 900\n[law]\n{name} = {c!r}\n")
+        own = run_drop(apply_law(COARSE, Law(((name, c),)))).penetration_depth
+        assert found["penetration_depth_m"] == pytest.approx(own, rel=1e-9), name
+        assert abs(own / plain - 1.0) > 0.02, name
+
+
+def test_simulate_says_which_terms_are_not_of_the_drop(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text("[material]\np_m_Pa = 900\n[law]\nrolling_shutter = 5.0\ninertial_drag = 300.0\n")
+    options = ["-o", str(tmp_path / "out"), "--store", str(tmp_path / "store"), "--workers", "1"]
+    assert call("simulate", *options, "--model", str(path), "--spacing-um", "125") == 0
+    said = capsys.readouterr().out
+    assert "rolling_shutter acts on what is measured, not on the drop" in said
+    assert "inertial_drag" not in said
 
 
 def test_the_catalogue_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
