@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import pytest
 
+from labsim.campaign import read_campaign
 from labsim.cli import main
 from labsim.effects import (
     Instrument,
     Model,
+    apply_effects,
     apply_model,
     check_model,
     list_effects,
@@ -28,6 +31,7 @@ from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
 from labsim.sph import simulate as run_drop
 
+DATA = Path(__file__).parents[2] / "data"
 FULL = Model(
     1012.3456789012345,
     (
@@ -207,8 +211,50 @@ def test_simulate_says_which_terms_are_not_of_the_drop(
     assert "inertial_drag" not in said
 
 
+def test_calibrate_goes_on_with_a_law(shared_store: str, tmp_path: Path) -> None:
+    """Dust that a law weakens as it is compacted, by half at 0.1, has a higher p_m for the same drops."""
+    source, campaign = DATA / "campaigns" / "p01", tmp_path / "campaign"
+    campaign.mkdir()
+    shutil.copy(source / "campaign.toml", campaign)
+    for name in ("D02", "D03", "D05"):
+        shutil.copytree(source / "drops" / name, campaign / "drops" / name)
+    found = []
+    for law in ("", "hardening = -0.5\n"):
+        path, out = tmp_path / "model.toml", tmp_path / f"out{len(found)}"
+        path.write_text(f"[material]\np_m_Pa = 1000\n[law]\n{law}")
+        options = ["-o", str(out), "--store", shared_store, "--workers", "1", "--quiet"]
+        assert call("calibrate", str(campaign), *options, "--model", str(path)) == 0
+        found.append(json.loads((out / "calibration.json").read_text()))
+    plain, weakened = found
+    assert 1.1 < weakened["p_m_Pa"]["q50"] / plain["p_m_Pa"]["q50"] < 2.0
+    for name, strength in plain["samples"].items():
+        assert weakened["samples"][name] > 1.1 * strength
+
+
+def test_a_learned_law_is_tried_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``labsim effects CAMPAIGN --from OUT``: an effect of the campaign, which changes a drop as the law does."""
+    ignored = shutil.ignore_patterns("ct", "effects")
+    campaign = shutil.copytree(DATA / "campaigns" / "u01", tmp_path / "campaign", ignore=ignored)
+    law = Law((("inertial_drag", 497.4), ("layer_at_0_5_mm", 0.8)))
+    (tmp_path / "out").mkdir()
+    write_model(tmp_path / "out" / "model.toml", Model(1507.0, law=law))
+    assert call("effects", str(campaign), "--from", str(tmp_path / "out"), "--json") == 0
+    written = [Path(each) for each in json.loads(capsys.readouterr().out)["written"]]
+    names = [f"learned_{name}" for name, _ in law.terms]
+    assert written == [campaign / "effects" / f"{name}.py" for name in names]
+    assert call("effects", str(campaign), "--json") == 0
+    listed = {each["name"]: each for each in json.loads(capsys.readouterr().out)["effects"]}
+    assert all(listed[name]["applies"] and listed[name]["affects_simulation"] for name in names)
+    chosen = [(name, {"coefficient": c}) for name, (_, c) in zip(names, law.terms, strict=True)]
+    read = read_campaign(campaign)
+    changed = apply_effects(COARSE, chosen, list_places(read)["D01"], list_effects(read))
+    assert changed == apply_law(COARSE, law) != COARSE
+    assert call("effects", str(campaign), "--from", str(tmp_path / "out")) == 2
+    assert f"{written[0]}: effects: is there already" in capsys.readouterr().err
+
+
 def test_the_catalogue_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    data = Path(__file__).parents[2] / "data" / "guettler2009"
+    data = DATA / "guettler2009"
     assert call("effects") == 0
     printed = capsys.readouterr().out
     assert call("effects", "--json", str(data)) == 0
