@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labsim.effects.terms import add_term, list_terms
 from labsim.errors import InferenceError, SimulationError
 from labsim.inference.emulation.curves import extract_curve
 from labsim.records import Material, Projectile
@@ -80,6 +81,18 @@ def test_keys_depend_on_every_value_and_on_the_solver(monkeypatch: pytest.Monkey
     before = make_key(base)
     monkeypatch.setattr(run_file, "solver_hash", lambda law: "another solver")
     assert make_key(base) != before
+
+
+def test_every_law_has_runs_of_its_own() -> None:
+    """No two terms of one coefficient, and no two coefficients of one term, are taken for one another in the store."""
+    base = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.6, Material())
+    terms = {name: term for name, term in list_terms().items() if term.acts.add is not None}
+    assert all(term.limits[0] < 0.04 < 0.05 < term.limits[1] for term in terms.values())
+    named: dict[str, list[str]] = {make_key(base): ["no law"]}
+    for name, term in terms.items():
+        for coefficient in (0.04, 0.05):
+            named.setdefault(make_key(add_term(base, term, coefficient)), []).append(f"{name} {coefficient}")
+    assert not [alike for alike in named.values() if len(alike) > 1]
 
 
 def test_many_workers_give_the_numbers_of_one(tmp_path: Path) -> None:
