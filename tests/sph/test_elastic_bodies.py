@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from labsim.records import Projectile
+from labsim.records import Material, Projectile
 from labsim.sph import DropSetting, Numerics, simulate
 from labsim.sph import particles as rows
 from labsim.sph.bodies import elastic_material, evolve_body, fill_block, place_rings, set_body
@@ -144,6 +144,38 @@ def test_stress_turns_with_the_body():
     assert s.sxx[0] == pytest.approx(-40.0, abs=0.1)
     assert s.szz[0] == pytest.approx(100.0, abs=0.1)
     assert abs(s.sxz[0]) < 0.1
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {},
+        {"strength_shape": ((0.15, 1.0), (0.3, 2.0))},
+        {"strength_of_strain": ((0.0, 1.0), (0.5, 2.0))},
+        {"shear_of_strain": ((0.0, 1.0), (0.5, 0.4))},
+        {"strength_of_depth": ((0.0, 1.5), (1.0, 1.5))},
+        {"strength_rate": 0.03},
+    ],
+)
+def test_a_law_of_the_dust_knows_no_direction(law):
+    """Objective: dust that is crushed and sheared along turned axes has the turned stress, with the same strength."""
+    setting = set_body(Material(p_m=1300.0), 1e-4, 1.0).replace(**law)
+    constants, tables = dust.make_constants(setting), dust.make_tables(setting)
+    gradient = np.array([[-60.0, 90.0], [20.0, -140.0]])  # 1/s
+    stresses = []
+    for angle in (0.0, 0.7, 2.0):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        s, own = rows.name_rows(setting, fill_at_rest(setting, np.ones(1), np.zeros(1), np.array([0.15])))
+        turned = turn @ gradient @ turn.T
+        s.lxx[:], s.lxz[:], s.lzx[:], s.lzz[:] = turned.ravel()
+        for _ in range(2000):
+            dust.update(0, 1, 1e-6, False, s, own, constants, tables)
+        stress = np.array([[s.sxx[0] - s.pressure[0], s.sxz[0]], [s.sxz[0], s.szz[0] - s.pressure[0]]])
+        stresses.append(turn.T @ stress @ turn)
+    size = np.abs(stresses[0]).max()
+    assert size > 100.0 and abs(stresses[0][0, 1]) > 0.05 * size
+    np.testing.assert_allclose(stresses[1], stresses[0], atol=1e-9 * size)
+    np.testing.assert_allclose(stresses[2], stresses[0], atol=1e-9 * size)
 
 
 @pytest.mark.parametrize(
