@@ -102,10 +102,13 @@ def one_rod(shared_store):
     campaign = replace(campaign, drops=drops, scans=())
     seen = measure(campaign)
 
-    def open_with(offsets, stated=None):
+    def open_with(offsets, stated=None, weighed=0.0):
+        """weighed : stated error of the rod's mass, relative."""
+        body = replace(rod, mass_sigma=weighed * rod.mass)
         other = replace(campaign, sample=replace(campaign.sample, scatter=stated))
         moved = [
-            stretch(drop, math.exp(-0.3 * offset)) for drop, offset in zip(seen.drops, offsets, strict=True)
+            replace(stretch(drop, math.exp(-0.3 * offset)), drop=replace(drop.drop, projectile=body))
+            for drop, offset in zip(seen.drops, offsets, strict=True)
         ]
         store = RunStore(shared_store)
         measurements = replace(seen, drops=moved)
@@ -124,6 +127,14 @@ def test_p_m_is_as_uncertain_as_its_samples_scatter(one_rod):
     added = math.sqrt(wide**2 - own**2)
     # in this campaign's likelihood all drops of a rod count about alike
     assert added == pytest.approx(math.sqrt((scatter.value**2 - 0.02**2) / OFFSETS.size), rel=0.3)
+
+
+def test_a_rod_that_is_weighed_once_is_off_in_all_its_drops(one_rod):
+    """D goes as m^0.9 and p_m^-0.3: 2 % of the mass are 6 % of p_m, however many drops there are."""
+    exact, rough = (
+        math.sqrt(one_rod(0 * OFFSETS, weighed=share)[1].covariance[0, 0]) for share in (0.0, 0.02)
+    )
+    assert math.sqrt(rough**2 - exact**2) == pytest.approx(0.06, rel=0.05)
 
 
 def test_samples_alike_keep_the_least_scatter(one_rod):

@@ -140,9 +140,8 @@ def linearise_drop(
                 model.predict(moved, point.instruments[name], instant) - here
             ) / point.step
 
-    mass = observed.drop.projectile
-    scatter = math.hypot(budget.scatter, MASS_TO_STRENGTH * mass.mass_sigma / mass.mass)
-    scatter = max(scatter, LEAST_SCATTER)
+    body = observed.drop.projectile
+    scatter = max(budget.scatter, LEAST_SCATTER)
     own_errors, own_strength = model.own_errors, by_strength * scatter
     columns = [by_contact * FREE, by_speed * SPEED_WIDTH, own_errors[:, 0]]
     if not with_others:
@@ -169,6 +168,8 @@ def linearise_drop(
         * budget.numerical_slope,
         "numerical strength": by_strength * budget.numerical_strength,
     }
+    if body.mass_sigma > 0.0:  # it was weighed once
+        shared[f"mass of {body}"] = by_strength * MASS_TO_STRENGTH * body.mass_sigma / body.mass
     for setting, (amplitude, sigma) in model.numerics.items():
         if model.table.knows(setting):
             moved = model.predict(features + response.change(setting, amplitude), instrument, instant)
@@ -185,7 +186,7 @@ def linearise_drop(
         np.clip(clock / stop, 0.0, 1.0),
         reach,
         math.log(model.radius),
-        math.log(mass.mass / model.radius**3),
+        math.log(body.mass / model.radius**3),
         model.unit,
         length,
         changes,
