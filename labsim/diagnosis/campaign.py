@@ -43,7 +43,7 @@ from .explore import EXPLORED, explore, needs_exploration
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import NESTED, PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
-from .next_experiment import Suggestion, suggest
+from .next_experiment import Suggestion, suggest, suggest_between_formulas
 from .pairs import confirm_pairs, refine_leading, return_to_singles
 from .screen import CLOSE, Score, Screening, draw_strengths, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
@@ -99,9 +99,9 @@ class Judgement:
 class Diagnosis(Judgement):
     """Everything diagnose found; report.tables writes it as diagnosis.json. p_m_averaged : (n,) draws over all causes, Pa.
 
-    suggestions : further experiments, the best first. untestable : beside what was found; combination : what is measured although
-    they may be there. misfit : of the nominal fit, every observation, every drop and map. learned : what is missing as a formula,
-    where nothing listed explains the data.
+    suggestions : further experiments, the best first, between the formulas of ``learned`` where several stand. untestable :
+    beside what was found; combination : what is measured although they may be there. misfit : of the nominal fit, every
+    observation, every drop and map. learned : what is missing as a formula, where nothing listed explains the data.
     """
 
     confusable: list[tuple[str, str, float]]
@@ -325,7 +325,6 @@ def diagnose_campaign(
             f"with {' + '.join(law.hypothesis)}: {text}" for text in warn_of_range(learned.problem, law)
         ]
     doubts += doubt_scales(seen.drops)
-    suggestions = suggest(problem, [nominal, *found.rivals], dict(found.verdict.probabilities))
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},
         confusable=list_confusable(found.screening),
@@ -340,13 +339,22 @@ def diagnose_campaign(
         posterior_extended=extended,
         p_m_averaged=averaged,
         scatter=estimate_scatter(problem, best),
-        suggestions=tuple(suggestions),
+        suggestions=tuple(suggest_next(found, learned)),
         runs_new=store.new,
         runs_reused=store.reused,
         wall=time.perf_counter() - began,
         warnings=(*doubts, *warnings),
         doubts=len(doubts),
     )
+
+
+def suggest_next(found: Judgement, learned: LearnedLaw | None) -> list[Suggestion]:
+    """Experiments that tell the formulas of a learned law apart where several stand, else the causes."""
+    if learned is not None:
+        with suppress(ExtrapolationError):  # one of the formulas cannot be simulated in what is planned
+            if between := suggest_between_formulas(learned):
+                return between
+    return suggest(found.problem, [found.nominal, *found.rivals], dict(found.verdict.probabilities))
 
 
 def allow_for_codes(problem: Problem, nominal: Fit, fit: Fit) -> Fit:

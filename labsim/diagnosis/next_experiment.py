@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -24,6 +24,7 @@ from ..inference.problem import Problem
 from ..records import FloatArray
 from .planned_drops import Prediction, plan_drops, predict_drops
 from .planned_scans import plan_scans, predict_scans
+from .unlisted.learned_law import LearnedLaw
 
 SEEN_BY_SPEED = (
     0.01  # of ln resistance, between the slowest and the fastest push: less is no cause that speed shows
@@ -32,17 +33,18 @@ DECIDED = 4.0  # standard deviations between two predictions that are told apart
 WORTHWHILE = 0.01  # bits below which an experiment is not suggested
 SMALLEST = 0.005  # probability below which a hypothesis is left out
 MOST = 5  # experiments that are suggested
+MOST_TOLD = 3  # of what one of them is to tell apart, that are named in its text
 CERTAIN = 0.95  # probability of the first from which no other projectile is asked for
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """change : what to do. tells : the causes that it is to tell apart, where it was made for two of them. predictions : what
-    each cause predicts, the most probable first, by its name."""
+    """change : what to do. tells : the causes that it is to tell apart, where it was made for two of them, or the formulas of a
+    learned law in words. predictions : what each of them predicts, the most probable first, by its name."""
 
     change: str
     information_bits: float
-    tells: tuple[tuple[str, ...], tuple[str, ...]] | None = None
+    tells: tuple[tuple[str, ...], ...] = ()
     predictions: tuple[tuple[str, Prediction], ...] = ()
 
     @property
@@ -54,9 +56,12 @@ class Suggestion:
     @property
     def text(self) -> str:
         """What to do and what for."""
-        return self.change + (
-            f", to tell {' from '.join(' + '.join(names) for names in self.tells)}" if self.tells else ""
-        )
+        if not self.tells:
+            return self.change
+        first, *others = [" + ".join(names) for names in self.tells[:MOST_TOLD]]
+        further = len(self.tells) - MOST_TOLD
+        more = f" or {further} more" if further > 0 else ""
+        return f"{self.change}, to tell {first} from {' or '.join(others)}{more}"
 
 
 def suggest(
@@ -78,6 +83,22 @@ def suggest(
         found += _suggest_planned(problem, standing, weight)
     worth = [each for each in found if each.information_bits >= WORTHWHILE]
     return sorted(worth, key=lambda each: -each.information_bits)[:MOST]
+
+
+def suggest_between_formulas(learned: LearnedLaw) -> list[Suggestion]:
+    """What would tell the formulas of a learned law apart, best first; none where one of them stands alone. They are as probable
+    as their evidence says."""
+    top = learned.best.fit.evidence
+    odds = [math.exp(each.fit.evidence - top) for each in learned.formulas]
+    probabilities = {
+        each.fit.hypothesis: odd / sum(odds) for each, odd in zip(learned.formulas, odds, strict=True)
+    }
+    standing = [each for each in learned.formulas if probabilities[each.fit.hypothesis] > SMALLEST]
+    if len(standing) < 2:
+        return []
+    tells = tuple(tuple(term.title for term in each.terms) for each in standing)
+    found = suggest(learned.problem, [each.fit for each in standing], probabilities)
+    return [replace(each, tells=tells) for each in found]
 
 
 def _suggest_planned(problem: Problem, standing: list[Fit], weight: FloatArray) -> list[Suggestion]:

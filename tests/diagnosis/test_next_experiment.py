@@ -5,15 +5,29 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
 from labsim.campaign import read_campaign
-from labsim.diagnosis.next_experiment import expected_weight, suggest
+from labsim.diagnosis import campaign as diagnosing
+from labsim.diagnosis.campaign import suggest_next
+from labsim.diagnosis.gain import HeldOut, measure_gain
+from labsim.diagnosis.next_experiment import (
+    MOST,
+    Suggestion,
+    expected_weight,
+    suggest,
+    suggest_between_formulas,
+)
 from labsim.diagnosis.planned_drops import HEAVIER, LARGER, plan_drops, predict_drops
+from labsim.diagnosis.unlisted.hats import make_effect
+from labsim.diagnosis.unlisted.learned_law import Formula, LearnedLaw
 from labsim.effects import list_effects
+from labsim.effects.terms import list_terms
+from labsim.errors import ExtrapolationError
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.observations.observe import observe_drops
@@ -24,6 +38,8 @@ from labsim.sph import simulate
 
 CAMPAIGN = read_campaign(Path(__file__).parents[2] / "data" / "campaigns" / "p01")
 EVEN = np.array([0.5, 0.5])
+NOTHING = HeldOut((), *[np.ones(1)] * 4)
+GAIN = measure_gain(NOTHING, NOTHING)
 
 
 @pytest.fixture(scope="module")
@@ -187,3 +203,69 @@ def test_a_third_hypothesis_that_predicts_the_same_leaves_little_to_tell() -> No
     # the twins cannot be told apart, the third can from both
     alike = -math.log(0.45 / 0.55 + 0.1 / 0.55 * math.exp(-40.5))
     assert found == pytest.approx((0.9 * alike + 0.1 * 40.5) / math.log(2))
+
+
+@pytest.fixture(scope="module")
+def learned(fitted) -> LearnedLaw:
+    """Two drags, either 300 Pa at 0.65 m/s, as formulas that the data tell apart by 1 in ln evidence."""
+    problem, nominal, _ = fitted
+    terms = [list_terms()[name] for name in ("inertial_drag", "viscous_drag")]
+    free = replace(
+        problem, effects={**problem.effects, **{term.name: make_effect(term, 500.0) for term in terms}}
+    )
+    formulas = []
+    for term, evidence, size in zip(terms, (-1.0, -2.0), (300.0 / 0.65**2, 300.0 / 0.65), strict=True):
+        begin = nominal.log_p_m, {term.name: size}
+        fit = fit_hypothesis(free, (term.name,), begin, nuisances=nominal, iterations=0)
+        formulas.append(Formula((term,), replace(fit, evidence=evidence), NOTHING, GAIN))
+    return LearnedLaw(tuple(formulas), free, GAIN)
+
+
+def test_formulas_are_told_apart_by_the_drops_that_they_differ_in(learned) -> None:
+    found = suggest_between_formulas(learned)
+    assert 0 < len(found) <= MOST
+    told = ", to tell a drag that grows with the square of the speed from a drag that grows with the speed"
+    assert all(each.text.endswith(told) for each in found)
+    (drop,) = [each for each in found if each.change.startswith("one more drop")]
+    assert "at 1.22 m/s" in drop.change  # the fastest: they were made alike at 0.65 m/s
+    (first, of_first), (second, of_second) = drop.predictions
+    assert (first, second) == ("inertial_drag", "viscous_drag")
+    assert of_first.depth < of_second.depth - of_first.depth_sigma and of_first.stop < of_second.stop
+    assert {"depth_mm", "stopping_time_ms"} <= set(of_first.summarise())
+    # three in four of the time one is right: other projectiles are asked for
+    assert any("another projectile" in each.change for each in found)
+
+
+def test_a_formula_that_stands_alone_asks_for_nothing(learned) -> None:
+    best, second = learned.formulas
+    far = replace(second, fit=replace(second.fit, evidence=best.fit.evidence - 20.0))
+    assert suggest_between_formulas(replace(learned, formulas=(best, far))) == []
+    assert suggest_between_formulas(replace(learned, formulas=(best,))) == []
+
+
+def test_causes_are_told_apart_where_formulas_cannot_be(fitted, learned, monkeypatch) -> None:
+    problem, nominal, friction = fitted
+    judged = SimpleNamespace(
+        problem=problem,
+        nominal=nominal,
+        rivals=[friction],
+        verdict=SimpleNamespace(
+            probabilities=[(("unknown",), 0.9), (("none",), 0.05), (("side_friction",), 0.05)]
+        ),
+    )
+    assert all(each.tells for each in suggest_next(judged, learned))
+    of_causes = suggest_next(judged, None)
+    assert of_causes and not any(each.tells for each in of_causes)
+    alone = replace(learned, formulas=learned.formulas[:1])
+    assert [each.text for each in suggest_next(judged, alone)] == [each.text for each in of_causes]
+
+    def fail(learned):
+        raise ExtrapolationError("p01", "runs", "do not come to rest")
+
+    monkeypatch.setattr(diagnosing, "suggest_between_formulas", fail)
+    assert [each.text for each in suggest_next(judged, learned)] == [each.text for each in of_causes]
+
+
+def test_of_many_formulas_three_are_named() -> None:
+    tells = tuple((name,) for name in ("v", "v²", "√v", "v³"))
+    assert Suggestion("one more drop", 1.0, tells).text == "one more drop, to tell v from v² or √v or 1 more"

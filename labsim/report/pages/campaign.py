@@ -124,6 +124,7 @@ def write_campaign_page(
         untestable=describe_untestable(found),
         gain=describe_gain(found, summary, labels),
         suggestions=found.suggestions,
+        between="formulas" if found.learned and any(each.tells for each in found.suggestions) else "causes",
         numerics=describe_numerics(summary["numerical_error"], found.problem),
         warnings=found.warnings,
         runs=(found.runs_new, found.runs_reused, found.wall),
