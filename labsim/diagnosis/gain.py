@@ -8,8 +8,8 @@ bends, hold_out_folds repeats it without the drops.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
@@ -26,13 +26,14 @@ FOLDS = 5
 @dataclass(frozen=True)
 class HeldOut:
     """Per drop, or some that were held out together: rms of the prediction (m), rms that is expected of a true model (m), ln
-    score, number of data."""
+    score, number of data. by_record : rms (m) of every record by its name, those too that were held out with others."""
 
     names: tuple[str, ...]
     rms: FloatArray
     expected: FloatArray
     log_score: FloatArray
     count: FloatArray
+    by_record: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -139,12 +140,17 @@ def hold_out_folds(problem: Problem, fit: Fit) -> HeldOut:
             problem, fit.hypothesis, (again.log_p_m, again.values), nuisances=fit, iterations=0
         )
         parts.append(predict_held_out(problem, there, groups=[fold]))
+
+    def join(key: str) -> FloatArray:
+        return np.concatenate([getattr(part, key) for part in parts])
+
     return HeldOut(
         tuple(name for part in parts for name in part.names),
-        *(
-            np.concatenate([getattr(part, key) for part in parts])
-            for key in ("rms", "expected", "log_score", "count")
-        ),
+        join("rms"),
+        join("expected"),
+        join("log_score"),
+        join("count"),
+        {name: rms for part in parts for name, rms in part.by_record.items()},
     )
 
 
@@ -162,9 +168,14 @@ def predict_held_out(
         nothing = np.full(1, math.nan)
         return HeldOut(names, nothing, nothing, nothing, np.ones(1))
     rms, expected, score, count = [], [], [], []
+    by_record: dict[str, float] = {}
+    held = {model.observed.name: int(np.count_nonzero(model.held)) for model in problem.tracks.models}
     drops, pull, _precision = _hold_out(problem, fit, known, groups)
-    for drop, lengths in drops:
+    for (drop, lengths), records in zip(drops, groups, strict=True):
         error = drop.miss(fit.drops.residual, pull)
+        ends = np.cumsum([held[name] for name in records])[:-1]
+        missed = np.split(lengths @ error, ends)
+        by_record |= {name: math.sqrt(np.mean(part**2)) for name, part in zip(records, missed, strict=True)}
         lower = np.linalg.cholesky(drop.spread)
         white = np.linalg.solve(lower, error)
         score.append(
@@ -173,7 +184,9 @@ def predict_held_out(
         rms.append(math.sqrt(np.mean((lengths @ error) ** 2)))
         expected.append(math.sqrt(np.mean(np.diag(lengths @ drop.spread @ lengths.T))))
         count.append(error.size)
-    return HeldOut(names, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float))
+    return HeldOut(
+        names, np.array(rms), np.array(expected), np.array(score), np.array(count, dtype=float), by_record
+    )
 
 
 def check_prediction(problem: Problem, fit: Fit, random: np.random.Generator, draws: int = DRAWS) -> float:

@@ -37,6 +37,14 @@ def test_every_drop_is_in_one_fold(fitted) -> None:
     names = [name for fold in held.names for name in fold.split(", ")]
     assert sorted(names) == sorted(problem.tracks.samples)
     assert np.all(held.rms > 0) and np.all(held.rms < 5 * held.expected)
+    # every record by itself: together they miss as much as their fold
+    rows = {model.observed.name: np.count_nonzero(model.held) for model in problem.tracks.models}
+    assert set(held.by_record) == set(rows)
+    for fold, rms in zip(held.names, held.rms, strict=True):
+        records = fold.split(", ")
+        square = sum(rows[name] * held.by_record[name] ** 2 for name in records)
+        assert square == pytest.approx(rms**2 * sum(rows[name] for name in records))
+    assert len({round(rms, 12) for rms in held.by_record.values()}) == len(rows)
 
 
 def test_where_the_fit_is_linear_repeating_it_says_the_same(fitted) -> None:

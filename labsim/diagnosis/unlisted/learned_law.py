@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -80,15 +80,26 @@ class Formula:
             self.fit.covariance[1 + self.fit.hypothesis.index(name), 1 + self.fit.hypothesis.index(name)]
         )
 
+    def trace(self, law: FreeLaw, places: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """What it adds at places of a law, and its standard deviation, in the law's unit; None where it adds nothing there."""
+        own = [k for k, term in enumerate(self.terms) if term.place == law.name]
+        if not own:
+            return None
+        shapes = np.stack([shape_at(self.terms[k], law, places) for k in own])
+        spread = self.fit.covariance[1:, 1:][np.ix_(own, own)]
+        return self.coefficients[own] @ shapes, np.sqrt(np.einsum("in,ij,jn->n", shapes, spread, shapes))
+
 
 @dataclass(frozen=True)
 class LearnedLaw:
     """formulas : those that were simulated, the one with most evidence first; problem : with their terms among its effects.
-    repeated : gain of the best on drops that neither fit has seen, both repeated without them."""
+    repeated : gain of the best on drops that neither fit has seen, both repeated without them; missed : of each of these the
+    rms (m) without the formula and with it."""
 
     formulas: tuple[Formula, ...]
     problem: Problem
     repeated: Gain
+    missed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def best(self) -> Formula:
@@ -133,9 +144,13 @@ def learn_law(
     formulas.sort(key=lambda each: -each.fit.evidence)
     without = hold_out_folds(problem, nominal)
     for k, formula in enumerate(formulas):
-        gain = measure_gain(without, hold_out_folds(free, formula.fit))
+        with_it = hold_out_folds(free, formula.fit)
+        gain = measure_gain(without, with_it)
         if not gain.log_score_difference <= 0.0:
-            return LearnedLaw(tuple(formulas[k:]), free, gain)
+            missed = {
+                name: (before, with_it.by_record[name]) for name, before in sorted(without.by_record.items())
+            }
+            return LearnedLaw(tuple(formulas[k:]), free, gain, missed)
     return None
 
 

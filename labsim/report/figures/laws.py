@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...diagnosis.unlisted.free_law import RecoveredLaw
-from ...diagnosis.unlisted.learned_law import Formula, shape_at
+from ...diagnosis.unlisted.learned_law import Formula
 from ...records import FloatArray
 from .interactive import MARGIN, Spec
 from .style import BLUE, INK, ORANGE, new_figure
@@ -27,21 +27,19 @@ def trace_law(law: RecoveredLaw) -> tuple[FloatArray, FloatArray, FloatArray]:
     return place, factor * mean, factor * sigma
 
 
-def trace_formula(law: RecoveredLaw, formula: Formula | None, place: FloatArray) -> FloatArray | None:
-    """What a formula adds at this place in the equations, as it is shown; None where it adds nothing there."""
-    if formula is None:
-        return None
+def trace_formula(
+    law: RecoveredLaw, formula: Formula | None, place: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """What a formula adds at this place in the equations and its standard deviation, as they are shown; None where it adds
+    nothing there."""
+    found = formula.trace(law.law, place) if formula is not None else None
     factor = law.law.place.factor
-    own = [
-        factor * c * shape_at(term, law.law, place)
-        for term, c in zip(formula.terms, formula.coefficients, strict=True)
-        if term.place == law.law.name
-    ]
-    return np.sum(own, axis=0) if own else None
+    return found and (factor * found[0], factor * found[1])
 
 
 def draw_laws(laws: Sequence[RecoveredLaw], path: Path, formula: Formula | None = None) -> Path:
-    """A panel a law: its mean with the band of 68 %, its knots marked, and the formula that was learned, dashed."""
+    """A panel a law: its mean with the band of 68 %, its knots marked, and the formula that was learned, dashed,
+    with a band of its own."""
     with new_figure(path, max(3.4 * len(laws), 5.0), 3.2) as figure:
         for ax, law in zip(np.atleast_1d(figure.subplots(1, len(laws))), laws, strict=True):
             place, mean, sigma = trace_law(law)
@@ -52,7 +50,9 @@ def draw_laws(laws: Sequence[RecoveredLaw], path: Path, formula: Formula | None 
             ax.plot(shown, np.interp(shown, place, mean), "o", color=BLUE, ms=4)
             learned = trace_formula(law, formula, place)
             if learned is not None:
-                ax.plot(place, learned, "--", color=ORANGE, label="formula")
+                value, error = learned
+                ax.fill_between(place, value - error, value + error, color=ORANGE, alpha=0.2, lw=0)
+                ax.plot(place, value, "--", color=ORANGE, label="formula")
                 ax.legend(frameon=False)
             along, up = law.law.place.axes
             ax.set_xlabel(along)
@@ -78,10 +78,18 @@ def plot_law(law: RecoveredLaw, formula: Formula | None = None) -> Spec:
     ]  # fmt: skip
     learned = trace_formula(law, formula, place)
     if learned is not None:
+        value, error = learned
         data.append(
             {
-                "type": "scatter", "mode": "lines", "x": place, "y": learned, "meta": "nominal", "name": "formula",
-                "line": {"width": 1.8, "dash": "dash"}, "hovertemplate": f"%{{y:{digits}}}",
+                "type": "scatter", "x": around, "y": np.concatenate([value + error, (value - error)[::-1]]), "fill": "toself",
+                "mode": "none", "line": {"width": 0}, "hoverinfo": "skip", "meta": "noise",
+            }
+        )  # fmt: skip
+        data.append(
+            {
+                "type": "scatter", "mode": "lines", "x": place, "y": value, "meta": "nominal", "name": "formula",
+                "line": {"width": 1.8, "dash": "dash"}, "customdata": error,
+                "hovertemplate": f"%{{y:{digits}}} ± %{{customdata:{digits}}}",
             }
         )  # fmt: skip
     along, up = law.law.place.axes
