@@ -22,6 +22,8 @@ from .contract import Instrument
 
 Knots = tuple[tuple[float, float], ...]
 MOST_DELAY = 0.6  # s/m: a tip of 1 m/s must not outrun the rows
+# parts of the equation: what is added to the mass, factors on two strengths, forces, and what a letter in these stands for
+MASS, SIGMA, SHEAR, FORCE, WHERE = "mass", "Σ", "Y", "force", "where"
 LEAST = 0.1  # of the strength that p_m gives, which a law must leave
 # of the deepest drop: a layer is felt by its share of the way
 IN_MM = (0.0, 0.04, 0.063, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0)
@@ -34,8 +36,8 @@ class LawPlace:
     shown, shown_unit : that at an axis. reach : of what it goes with, as far as drops come. least : smallest value, a smaller one
     ``breaks`` physics; of a camera's, and most, ends of its coefficients; rising : whether falling values do, too. scale : a
     usual value. knots : of what it goes with, in shares of the deepest drop where that is mm, for a law without a formula; none
-    where no runs say what it changes. add : to a drop, a table of knots; see : to a camera, a coefficient at a size of its pixels
-    (m).
+    where no runs say what it changes. enters : the parts of the equation above that a law stands in, and how, {} for the law.
+    add : to a drop, a table of knots; see : to a camera, a coefficient at a size of its pixels (m).
     """
 
     name: str
@@ -50,6 +52,7 @@ class LawPlace:
     breaks: str
     scale: float
     knots: tuple[float, ...]
+    enters: tuple[tuple[str, str], ...]
     add: Callable[[DropSetting, Knots], DropSetting] | None
     see: Callable[[Instrument, float, float], Instrument] | None = None
     most: float = math.inf
@@ -151,89 +154,103 @@ LAW_PLACES = {
         LawPlace(
             "strength of filling factor", "filling factor", "1", "1",
             "a compressive strength that is more than p_m gives by a share of", "more strength", "%",
-            0.15, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.03, 0.07, 0.13), _add_share("strength_shape"),
+            0.15, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.03, 0.07, 0.13),
+            ((SIGMA, "(1 + {})"),), _add_share("strength_shape"),
         ),
         LawPlace(
             "strength of plastic strain", "plastic shear strain", "1", "1",
             "a compressive strength, and the shear strength with it, that is more by a share of", "more strength", "%",
-            2.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.15, 0.6), _add_share("strength_of_strain"),
+            2.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.15, 0.6),
+            ((SIGMA, "(1 + {})"),), _add_share("strength_of_strain"),
         ),
         LawPlace(
             "shear strength of plastic strain", "plastic shear strain", "1", "1",
             "a shear strength that is more by a share of", "more shear strength", "%",
-            2.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.15, 0.6), _add_share("shear_of_strain"),
+            2.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 0.15, 0.6),
+            ((SHEAR, "(1 + {})"),), _add_share("shear_of_strain"),
         ),
         LawPlace(
             "force of depth", "depth", "tip radii", "Pa",
             "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
-            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0), _add_force("force_of_depth", None),
+            12.0, -math.inf, "", 400.0, (0.0, 0.5, 1.0, 2.0, 4.0),
+            ((FORCE, "A {}"),), _add_force("force_of_depth", None),
         ),
         LawPlace(
             "force of depth in mm", "depth", "mm", "Pa",
             "a force upwards on the tip, over its cross-section, of", "force upwards", "Pa",
-            100.0, -math.inf, "", 400.0, IN_MM, _add_force("force_of_depth", 1e-3),
+            100.0, -math.inf, "", 400.0, IN_MM,
+            ((FORCE, "A {}"),), _add_force("force_of_depth", 1e-3),
         ),
         LawPlace(
             "force alike for all tips", "depth", "mm", "mN",
             "a force upwards, alike for all tips, of", "force upwards", "mN",
             100.0, -math.inf, "", 0.3, (0.0, 1.0),
-            _add_force("force_of_depth", 1e-3, lambda a: 1e-3 / (math.pi * a**2)),
+            ((FORCE, "{}"),), _add_force("force_of_depth", 1e-3, lambda a: 1e-3 / (math.pi * a**2)),
         ),
         LawPlace(
             "force on the rim", "depth", "mm", "N/m",
             "a force upwards on the tip, over its circumference, of", "force upwards", "N/m",
-            100.0, -math.inf, "", 0.1, (0.0, 1.0), _add_force("force_of_depth", 1e-3, lambda a: 2.0 / a),
+            100.0, -math.inf, "", 0.1, (0.0, 1.0),
+            ((FORCE, "2π a {}"),), _add_force("force_of_depth", 1e-3, lambda a: 2.0 / a),
         ),
         LawPlace(
             "strength of depth", "depth where dust lay", "mm", "1",
             "a compressive strength of the dust where it lay that is more by a share of", "more strength", "%",
-            100.0, LEAST - 1.0, "leaves no strength", 1.0, IN_MM, _add_share("strength_of_depth", 1e-3),
+            100.0, LEAST - 1.0, "leaves no strength", 1.0, IN_MM,
+            ((SIGMA, "(1 + {})"),), _add_share("strength_of_depth", 1e-3),
         ),
         LawPlace(
             "force of speed", "speed", "m/s", "Pa",
             "a force against the motion, over the tip's cross-section, of", "force against the motion", "Pa",
-            2.0, 0.0, "pushes along the motion", 400.0, (0.0, 0.1, 0.3, 0.6, 1.2), _add_force("force_of_speed", 1.0),
+            2.0, 0.0, "pushes along the motion", 400.0, (0.0, 0.1, 0.3, 0.6, 1.2),
+            ((FORCE, "A {}"),), _add_force("force_of_speed", 1.0),
         ),
         LawPlace(
             "viscosity of depth", "depth", "tip radii", "Pa s/m",
             "a force against the motion, over the tip's cross-section, that is its speed times", "force over speed", "Pa s/m",
-            12.0, 0.0, "pushes along the motion", 400.0, (0.0, 1.0, 4.0), _add_force("viscosity_of_depth", None),
+            12.0, 0.0, "pushes along the motion", 400.0, (0.0, 1.0, 4.0),
+            ((FORCE, "A v {}"),), _add_force("viscosity_of_depth", None),
         ),
         LawPlace(
             "drag of depth", "depth", "tip radii", "Pa s²/m²",
             "a force against the motion, over the tip's cross-section, that is the square of its speed times",
             "force over the square of the speed", "Pa s²/m²",
-            12.0, 0.0, "pushes along the motion", 600.0, (0.0, 1.0, 4.0), _add_force("drag_of_depth", None),
+            12.0, 0.0, "pushes along the motion", 600.0, (0.0, 1.0, 4.0),
+            ((FORCE, "A v² {}"),), _add_force("drag_of_depth", None),
         ),
         LawPlace(
             "force of time", "time since contact", "ms", "Pa",
             "a force against the motion, over the tip's cross-section, of", "force against the motion", "Pa",
-            30.0, 0.0, "pushes along the motion", 400.0, (0.0, 1.0, 2.0, 4.0), _add_force("force_of_time", 1e-3),
+            30.0, 0.0, "pushes along the motion", 400.0, (0.0, 1.0, 2.0, 4.0),
+            ((FORCE, "A {}"),), _add_force("force_of_time", 1e-3),
         ),
         LawPlace(
             "mass of depth", "depth", "tip radii", "1",
             "dust that moves with the tip, over the mass of the projectile, of", "mass that sticks", "%",
-            12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass("mass_of_depth"),
+            12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0),
+            ((MASS, "{}"),), _add_mass("mass_of_depth"),
         ),
         LawPlace(
             "gathered mass of depth", "depth", "tip radii", "1",
             "dust that lies still until the tip takes it along, over the mass of the projectile, of", "mass that is gathered",
-            "%", 12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0), _add_mass("gathered_of_depth"), rising=True,
+            "%", 12.0, 0.0, "takes mass away", 0.3, (0.0, 1.0, 4.0),
+            ((MASS, "k"), (FORCE, "m k′ v²/a"), (WHERE, "k = {}")), _add_mass("gathered_of_depth"), rising=True,
         ),
         LawPlace(
             "strength of size", "radius of the tip", "mm", "1",
             "a strength whose logarithm differs from that of p_m by", "ln strength", "1",
-            5.0, -math.inf, "", 0.3, (), _add_size,
+            5.0, -math.inf, "", 0.3, (),
+            ((SIGMA, "exp({})"),), _add_size,
         ),
         LawPlace(
             "clock of row", "row of the picture", "px", "µs",
             "a camera that exposes the tip later by", "later", "µs",
-            1000.0, -100.0, "", 6.0, (), None, most=100.0, see=_delay_rows,
+            1000.0, -100.0, "", 6.0, (), (), None, most=100.0, see=_delay_rows,
         ),
         LawPlace(
             "clock of time", "time", "s", "1",
             "a camera whose time between frames grows by", "longer", "1",
-            0.1, -30.0, "", 10.0, (), None, most=30.0,  # in 30 ms the rate must not turn around
+            0.1, -30.0, "", 10.0, (), (), None, most=30.0,  # in 30 ms the rate must not turn around
             see=lambda camera, value, _: camera.replace(clock_drift=camera.clock_drift + value),
         ),
     )

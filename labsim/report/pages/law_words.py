@@ -10,8 +10,10 @@ import numpy as np
 from ...diagnosis.campaign import Diagnosis
 from ...diagnosis.judge import PREDICTED
 from ...diagnosis.unlisted.free_law import EMBEDDED, RecoveredLaw
+from ...diagnosis.unlisted.hats import shape_at
 from ...diagnosis.unlisted.learned_law import Formula
 from ...diagnosis.unlisted.wobble import Wobble
+from ...effects.law_places import FORCE, MASS, SHEAR, SIGMA, WHERE
 from .page import show_number
 
 MISSING = {
@@ -23,6 +25,7 @@ MISSING = {
 }
 # after the unit of a force: what it goes with
 PER = {"Pa": " of its cross-section", "N/m": " of its circumference", "mN": ", alike for all tips,"}
+POINTS = 41  # of a curve in diagnosis.json
 CLEAR = 2.0  # standard deviations from which a further law of several is named
 
 
@@ -38,7 +41,8 @@ def say_missing(found: Diagnosis) -> str:
     if missed and not any(part.missed for part in parts if part.kind == "drops"):
         return f"shows in {' and '.join(missed)} alone: p_m explains the drops"
     if found.learned is not None:
-        return f"is like {say_formula(found.learned.best)}"
+        equation = say_equation(found.learned.best)
+        return f"is like {say_formula(found.learned.best)}" + (f", so that {equation}" if equation else "")
     wobble = unknown.find_wobble(found.nominal)
     if wobble is not None:
         return (
@@ -177,17 +181,42 @@ def _describe_wobble(found: Diagnosis) -> dict[str, Any] | None:
 
 def say_formula(formula: Formula) -> str:
     """What is added to the equations, with coefficients ± standard deviations."""
+    said = zip(formula.terms, _say_terms(formula), strict=True)
+    return " and ".join(f"{term.acts.words} {text}" for term, text in said)
+
+
+def say_equation(formula: Formula) -> str:
+    """The equation of motion with a formula in it, as labsim/effects/law_places.py has it; empty where all of it is the camera's.
+
+    m z″ = m g − F_dust − A (513 ± 49) Pa s²/m² × v²
+    """
+    parts: dict[str, list[str]] = {}
+    for term, text in zip(formula.terms, _say_terms(formula), strict=True):
+        for part, how in term.acts.enters:
+            parts.setdefault(part, []).append(how.format(text))
+    if not parts:
+        return ""
+    strengths = ", ".join(" ".join([name, *parts[name]]) for name in (SIGMA, SHEAR) if name in parts)
+    dust = f"F_dust[{strengths}]" if strengths else "F_dust"
+    forces = "".join(f" − {force}" for force in parts.get(FORCE, []))
+    moved = f"m (1 + {' + '.join(parts[MASS])}) (z″ − g) = −" if MASS in parts else "m z″ = m g −"
+    return ", ".join([f"{moved} {dust}{forces}", *parts.get(WHERE, [])])
+
+
+def _say_terms(formula: Formula) -> list[str]:
+    """Each term without its place: ``(513 ± 49) Pa s²/m² × v²``."""
     said = []
     for term, c, sigma in zip(formula.terms, formula.coefficients, formula.sigma, strict=True):
         digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
         unit = "" if term.unit == "1" else f" {term.unit}"
         times = "" if term.formula == "1" else f" × {term.formula}"
-        said.append(f"{term.acts.words} ({c:.{digits}f} ± {sigma:.{digits}f}){unit}{times}")
-    return " and ".join(said)
+        size = show_number(float(c), f"{{:.{digits}f}}")
+        said.append(f"({size} ± {sigma:.{digits}f}){unit}{times}")
+    return said
 
 
 def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
-    """For diagnosis.json: the formula with its coefficients, rivals and held-out drops; None where none was learned."""
+    """For diagnosis.json: the formula, its coefficients and curves, rivals and held-out drops; None where none was learned."""
     learned = found.learned
     if learned is None:
         return None
@@ -199,13 +228,20 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
             for term, c, sd in zip(best.terms, best.coefficients, best.sigma, strict=True)
         ],
         "formula": say_formula(best),
+        "equation": say_equation(best),
         "place": " and ".join(dict.fromkeys(term.place for term in best.terms)),
+        "evidence": best.fit.evidence,
         "log_bayes": best.fit.evidence - found.nominal.evidence,
         "p_m_Pa": {"mean": math.exp(log_p_m), "sd": math.exp(log_p_m) * sigma},
+        "curve": _describe_curves(found, best),
         "rivals": [
             {
                 "terms": [term.name for term in each.terms],
+                "coefficients": each.coefficients.tolist(),
+                "sd": each.sigma.tolist(),
+                "units": [term.unit for term in each.terms],
                 "formula": say_formula(each),
+                "evidence": each.fit.evidence,
                 "log_evidence_behind": best.fit.evidence - each.fit.evidence,
             }
             for each in learned.formulas[1:]
@@ -214,27 +250,78 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
             "rms_before_m": gain.rms_nominal,
             "rms_after_m": gain.rms_extended,
             "rms_noise_m": gain.rms_noise,
+            "drops": [
+                {"name": name, "rms_before_m": before, "rms_after_m": after}
+                for name, (before, after) in learned.missed.items()
+            ],
         },
     }
+
+
+def _describe_curves(found: Diagnosis, formula: Formula) -> list[dict[str, Any]]:
+    """Every term of a formula at POINTS places, as far as the data reach, with the band of 68 % by its coefficient's error.
+
+    A filling factor is the dust's own, not its compaction. Terms that need no runs have no free law that says how far: those of
+    the tip's radius go from the smallest tip to the largest, those of a clock as far as drops come anywhere.
+    """
+    laws = {law.name: law for law in (found.unknown.tangents.laws if found.unknown.tangents else ())}
+    radii = [1e3 * group.projectile.tip_radius for group in found.problem.groups]
+    curves = []
+    for term, c, sigma in zip(formula.terms, formula.coefficients, formula.sigma, strict=True):
+        acts = term.acts
+        law = laws.get(term.place)
+        if law is not None:
+            places = np.linspace(*law.reach, POINTS)
+            shape = shape_at(term, law, places)
+        else:
+            of_size = acts.over == "radius of the tip"
+            places = (
+                np.linspace(min(radii), max(radii), POINTS)
+                if of_size
+                else np.linspace(0.0, acts.reach, POINTS)
+            )
+            shape = term.shape(places)
+        curves.append(
+            {
+                "term": term.name,
+                "over": acts.over,
+                "unit": acts.unit,
+                "value_unit": acts.value_unit,
+                "x": places.tolist(),
+                "y": (c * shape).tolist(),
+                "low": (c * shape - sigma * np.abs(shape)).tolist(),
+                "high": (c * shape + sigma * np.abs(shape)).tolist(),
+            }
+        )
+    return curves
 
 
 def say_learned(found: Diagnosis) -> list[str]:
     """What was learned, in lines; none where nothing was."""
     if found.learned is None:
         return []
-    best, alike = found.learned.best, found.learned.alike
+    best, alike, others = found.learned.best, found.learned.alike, found.learned.formulas[1:]
     gain = found.learned.repeated
     before, after, noise = (
         show_number(1e6 * rms, "{:.1f}") for rms in (gain.rms_nominal, gain.rms_extended, gain.rms_noise)
     )
     p_m, sigma = math.exp(best.fit.log_p_m) / 1e3, math.sqrt(best.fit.covariance[0, 0])
-    said = [
-        f"a formula for what is missing: {say_formula(best)}",
+    said = [f"a formula for what is missing: {say_formula(best)}"]
+    if equation := say_equation(best):
+        said.append(f"the equation of motion with it: {equation}")
+    said.append(
         f"with it held-out drops are missed by {after} µm rms, by {before} µm without, by {noise} µm were it the truth; "
-        f"p_m is {p_m:.3g} ± {p_m * sigma:.2g} kPa",
-    ]
+        f"p_m is {p_m:.3g} ± {p_m * sigma:.2g} kPa"
+    )
+
+    def say_behind(formula: Formula) -> str:
+        behind = best.fit.evidence - formula.fit.evidence
+        return f"{say_formula(formula)} ({behind:.1f} behind in ln evidence)"
+
     if alike:
-        said.append(f"hardly told from it here: {'; '.join(map(say_formula, alike))}")
+        said.append(f"hardly told from it here: {'; '.join(map(say_behind, alike))}")
+    elif others:
+        said.append(f"next best is {say_behind(others[0])}")
     return said
 
 
@@ -266,7 +353,7 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
                 "figure": f"law{k}",
                 "title": _begin(law.law.name),
                 "text": f"{_begin(law.law.place.axes[1])} against {law.law.place.axes[0]}: {points}. The band holds 68 %."
-                + (" Dashed: the formula." if law.law.name in drawn else ""),
+                + (" Dashed: the formula, with its band." if law.law.name in drawn else ""),
             }
         )
     learned = [*say_learned(found), "labsim simulate --model model.toml simulates a drop with it"]
