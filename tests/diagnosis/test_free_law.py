@@ -294,4 +294,8 @@ def test_a_hidden_film_is_unknown_and_seen_at_its_depth(shared_store, tmp_path) 
     assert BEGIN < place[np.argmax(drawn)] < END
     assert best.fit.evidence > found.nominal.evidence + 10.0
     assert best.gain.log_score_difference > 0.0  # of held-out drops, of which six by one rod show little
+    assert sorted(learned.missed) == sorted(drop.name for drop in drops)
+    pooled = [math.sqrt(np.mean([each[k] ** 2 for each in learned.missed.values()])) for k in (0, 1)]
+    # the drops have about as many rows
+    assert pooled == pytest.approx([learned.repeated.rms_nominal, learned.repeated.rms_extended], rel=0.2)
     assert not any(term.name in problem.effects for term in best.terms)
