@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import hashlib
 import html
 import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from labsim import __version__
+from labsim.diagnosis.next_experiment import Suggestion
+from labsim.diagnosis.planned_drops import DropPrediction
+from labsim.diagnosis.unlisted.learned_law import Formula, LearnedLaw
+from labsim.effects.terms import list_terms
 from labsim.report.figures.interactive import SIGNS, SYMBOLS
+from labsim.report.outputs import write_result
 from labsim.report.pages.phrases import say_interval, say_p_value, say_probability
 from labsim.sph import solver_hash
 
@@ -195,6 +203,42 @@ def test_the_extension_takes_the_discrepancy_out(effect_found) -> None:  # type:
     """On drops held out, where it is well above what noise leaves."""
     gain = effect_found.gain
     assert gain.rms_nominal > 2 * gain.rms_noise and gain.fraction_removed > 0.8
+
+
+def test_an_experiment_between_formulas_is_on_the_page_in_the_lines_and_in_the_file(
+    effect_found, tmp_path: Path
+) -> None:  # type: ignore[no-untyped-def]
+    terms = [list_terms()[name] for name in ("inertial_drag", "viscous_drag")]
+    formulas = []
+    for term, depth in zip(terms, (1.958e-3, 1.986e-3), strict=True):
+        fit = SimpleNamespace(
+            hypothesis=(term.name,), values={term.name: 500.0}, covariance=np.diag([0.05, 50.0]) ** 2, log_p_m=7.0,
+            evidence=10.0 - 1e3 * depth,
+        )  # fmt: skip
+        formulas.append(Formula((term,), fit, None, None))
+    predictions = tuple(
+        (term.name, DropPrediction(np.zeros(1), np.eye(1), depth, 1.6e-5, 4.94e-3))
+        for term, depth in zip(terms, (1.958e-3, 1.986e-3), strict=True)
+    )
+    tells = tuple((term.title,) for term in terms)
+    found = dataclasses.replace(
+        effect_found,
+        learned=LearnedLaw(tuple(formulas), effect_found.problem, effect_found.gain),
+        suggestions=(Suggestion("one more drop at 0.71 m/s", 3.3, tells, predictions),),
+    )
+    summary, lines = write_result(found, tmp_path)
+    drags = "a drag that grows with the square of the speed", "a drag that grows with the speed"
+    said = f"one more drop at 0.71 m/s, to tell {drags[0]} from {drags[1]}"
+    assert f"next experiment: {said} (3.3 bits)" in lines
+    assert "    viscous_drag expects 1.986 ± 0.016 mm in 4.94 ms" in lines
+    (told,) = summary["next_experiment"]
+    assert told["change"] == said
+    assert [each["cause"] for each in told["predictions"]] == ["inertial_drag", "viscous_drag"]
+    assert told["predictions"][0]["depth_mm"] == pytest.approx(1.958)
+    text = Page(tmp_path / "report.html").text.replace("\u00a0", " ")
+    assert f"What would tell the formulas that still stand apart ({drags[0]}; {drags[1]})" in text
+    assert "one more drop at 0.71 m/s: 3.3 bits" in text
+    assert "viscous drag: 1.986 ± 0.016 mm in 4.94 ms" in text
 
 
 def test_a_single_drop_is_calibrated(calibrated: Path) -> None:
