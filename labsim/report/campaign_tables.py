@@ -422,7 +422,11 @@ def extended_model(found: Diagnosis) -> Model:
         terms = tuple(
             (term.name, float(c)) for term, c in zip(learned.terms, learned.coefficients, strict=True)
         )
-        return Model(math.exp(learned.fit.log_p_m), law=Law(terms))
+        listed = tuple(
+            (effect.name, effect.at(found.problem.at(effect.name, learned.fit.values[effect.name])))
+            for effect in learned.causes
+        )
+        return Model(math.exp(learned.fit.log_p_m), listed, law=Law(terms))
     effects = tuple(
         (name, found.problem.effects[name].at(found.problem.at(name, found.best.values[name])))
         for name in (found.best.hypothesis if found.verdict.word == "effect" else ())

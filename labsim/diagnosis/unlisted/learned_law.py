@@ -15,6 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ...effects import Effect
 from ...effects.terms import Term, list_terms
 from ...errors import LabsimError
 from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis, fit_p_value
@@ -52,13 +53,14 @@ ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas ap
 
 @dataclass(frozen=True)
 class Formula:
-    """Some terms as a fit of their own runs, beside listed causes where they do not explain the data alone. gain : over the
-    nominal model, on drops held out of both fits."""
+    """Some terms as a fit of their own runs. gain : over the nominal model, on drops held out of both fits; causes : listed ones,
+    beside which the terms stand where they do not explain the data alone."""
 
     terms: tuple[Term, ...]
     fit: Fit
     held_out: HeldOut
     gain: Gain
+    causes: tuple[Effect, ...] = ()
 
     @property
     def coefficients(self) -> FloatArray:
@@ -68,14 +70,8 @@ class Formula:
     def sigma(self) -> FloatArray:
         return np.array([self.error(term.name) for term in self.terms])
 
-    @property
-    def causes(self) -> Hypothesis:
-        """Names of the listed causes beside the terms."""
-        names = {term.name for term in self.terms}
-        return tuple(name for name in self.fit.hypothesis if name not in names)
-
     def error(self, name: str) -> float:
-        """Standard deviation of the amplitude of a term or cause."""
+        """Standard deviation of the coefficient of a term, or of the amplitude of a cause."""
         return math.sqrt(
             self.fit.covariance[1 + self.fit.hypothesis.index(name), 1 + self.fit.hypothesis.index(name)]
         )
@@ -138,7 +134,8 @@ def learn_law(
             gain = measure_gain(before, held_out)
             if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
                 named = tuple(terms[name] for name in fit.hypothesis if name in terms)
-                formulas.append(Formula(named, fit, held_out, gain))
+                listed = tuple(free.effects[name] for name in fit.hypothesis if name not in terms)
+                formulas.append(Formula(named, fit, held_out, gain, listed))
     if not formulas:
         return None
     formulas.sort(key=lambda each: -each.fit.evidence)

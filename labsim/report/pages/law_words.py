@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from ...diagnosis.unlisted.free_law import EMBEDDED, RecoveredLaw
 from ...diagnosis.unlisted.hats import shape_at
 from ...diagnosis.unlisted.learned_law import Formula
 from ...diagnosis.unlisted.wobble import Wobble
+from ...effects import Effect
 from ...effects.law_places import FORCE, MASS, SHEAR, SIGMA, WHERE
 from .page import show_number
+from .phrases import shown_unit
 
 MISSING = {
     "depth and speed": "a law of depth and speed, about {size} % of the depth",
@@ -182,7 +185,21 @@ def _describe_wobble(found: Diagnosis) -> dict[str, Any] | None:
 def say_formula(formula: Formula) -> str:
     """What is added to the equations, with coefficients ± standard deviations."""
     said = zip(formula.terms, _say_terms(formula), strict=True)
-    return " and ".join(f"{term.acts.words} {text}" for term, text in said)
+    terms = " and ".join(f"{term.acts.words} {text}" for term, text in said)
+    return terms + "".join(
+        f", beside a listed cause: {each}" for each in map(partial(_say_listed, formula), formula.causes)
+    )
+
+
+def _say_listed(formula: Formula, effect: Effect) -> str:
+    """``the dust has a crust (crust excess 0.046 ± 0.002)``."""
+    parameter, amplitude = effect.amplitudes[0], formula.fit.values[effect.name]
+    factor, unit = shown_unit(parameter)
+    size, sigma = factor * parameter.hold(amplitude), factor * formula.error(effect.name)
+    digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
+    title = effect.say(parameter.hold(amplitude))
+    amount = f"{show_number(size, f'{{:.{digits}f}}')} ± {sigma:.{digits}f} {unit}".rstrip()
+    return f"{title[0].lower()}{title[1:]} ({parameter.name.replace('_', ' ')} {amount})"
 
 
 def say_equation(formula: Formula) -> str:
@@ -226,6 +243,14 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
         "terms": [
             {"term": term.name, "coefficient": float(c), "sd": float(sd), "unit": term.unit}
             for term, c, sd in zip(best.terms, best.coefficients, best.sigma, strict=True)
+        ],
+        "beside": [
+            {
+                "effect": effect.name,
+                **found.problem.at(effect.name, best.fit.values[effect.name]),
+                "sd": best.error(effect.name),
+            }
+            for effect in best.causes
         ],
         "formula": say_formula(best),
         "equation": say_equation(best),
