@@ -24,7 +24,9 @@ def a_formula(**coefficients: float) -> Formula:
     sigma = np.array([0.0, *(0.1 * abs(c) for c in coefficients.values())])
     correlation = np.eye(len(sigma))
     correlation[1, 2:3] = correlation[2:3, 1] = 0.5
-    fit = SimpleNamespace(values=coefficients, covariance=np.outer(sigma, sigma) * correlation)
+    fit = SimpleNamespace(
+        hypothesis=tuple(coefficients), values=coefficients, covariance=np.outer(sigma, sigma) * correlation
+    )
     return Formula(terms, fit, None, None)
 
 

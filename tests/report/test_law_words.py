@@ -15,9 +15,10 @@ from labsim.diagnosis.unlisted.hats import FreeLaw
 from labsim.diagnosis.unlisted.learned_law import Formula, LearnedLaw
 from labsim.diagnosis.unlisted.unknown import WOBBLE, UnknownFit
 from labsim.diagnosis.unlisted.wobble import Wobble
+from labsim.effects import list_effects
 from labsim.effects.law_places import LAW_PLACES
 from labsim.effects.terms import list_terms
-from labsim.report.campaign_tables import say_verdict
+from labsim.report.campaign_tables import extended_model, say_verdict
 from labsim.report.pages.law_words import (
     describe_learned,
     describe_unknown,
@@ -134,15 +135,17 @@ def test_a_listed_cause_that_comes_nearest_is_said_to(found, predicted, evidence
 
 
 def a_formula(evidence: float = 50.0, **coefficients: tuple[float, float]) -> Formula:
-    """coefficients : of each term, and standard deviation."""
-    terms = tuple(list_terms()[name] for name in coefficients)
+    """coefficients : of each term or listed cause, and standard deviation."""
+    terms = tuple(list_terms()[name] for name in coefficients if name in list_terms())
+    causes = tuple(list_effects()[name] for name in coefficients if name not in list_terms())
     fit = SimpleNamespace(
+        hypothesis=tuple(coefficients),
         values={name: c for name, (c, _) in coefficients.items()},
         covariance=np.diag([0.05, *(sigma for _, sigma in coefficients.values())]) ** 2,
         log_p_m=np.log(1500.0),
         evidence=evidence,
     )
-    return Formula(terms, fit, None, None)
+    return Formula(terms, fit, None, None, causes)
 
 
 @pytest.mark.parametrize(
@@ -169,6 +172,9 @@ def a_formula(evidence: float = 50.0, **coefficients: tuple[float, float]) -> Fo
             "m z″ = m g − F_dust[Σ (1 + (0.50 ± 0.10) × 10 (φ − φ0)), Y (1 + (0.50 ± 0.10) × ε)] "
             "− A (500 ± 50) Pa s²/m² × v²",
         ),
+        ({"shaft_drag": (820.0, 40.0)}, "m z″ = m g − F_dust − A v² (820 ± 40) Pa s²/m² × z/a"),
+        ({"shaft_viscosity": (82.0, 4.0)}, "m z″ = m g − F_dust − A v (82.0 ± 4.0) Pa s/m × z/a"),
+        ({"time_ramp": (82.0, 4.0)}, "m z″ = m g − F_dust − A (82.0 ± 4.0) Pa × t/ms"),
         ({"rolling_shutter": (5.0, 0.1)}, ""),
         (
             {"rolling_shutter": (5.0, 0.1), "viscous_drag": (264.0, 28.0)},
@@ -218,6 +224,21 @@ def test_what_was_learned_is_said_with_its_equation_and_the_next_best(learned):
         "p_m is 1.5 ± 0.075 kPa",
         f"next best is {SECOND} (4.2 behind in ln evidence)",
     ]
+
+
+def test_a_formula_beside_a_listed_cause_says_both(learned):
+    both = a_formula(50.0, surface_crust=(0.046, 0.002), inertial_drag=(513.0, 49.0))
+    assert both.sigma == pytest.approx([49.0])
+    learned.learned = replace(learned.learned, formulas=(both,))
+    learned.problem.at = lambda name, amplitude: {"excess": amplitude}
+    said = f"{FORMULA}, beside a listed cause: the top of the sample is denser than the bulk (excess 0.0460 ± 0.0020)"
+    assert say_learned(learned)[0] == f"a formula for what is missing: {said}"
+    told = describe_learned(learned)
+    assert told["beside"] == [{"effect": "surface_crust", "excess": 0.046, "sd": pytest.approx(0.002)}]
+    learned.verdict, learned.campaign = SimpleNamespace(word="unknown"), None
+    model = extended_model(learned)
+    assert model.law.terms == (("inertial_drag", 513.0),) and model.p_m == pytest.approx(1500.0)
+    assert [(name, values["excess"]) for name, values in model.effects] == [("surface_crust", 0.046)]
 
 
 def test_what_is_hardly_told_from_it_is_said_with_how_far_behind_it_is(learned):

@@ -192,7 +192,7 @@ def say_formula(formula: Formula) -> str:
 
 
 def _say_listed(formula: Formula, effect: Effect) -> str:
-    """``the dust has a crust (crust excess 0.046 ± 0.002)``."""
+    """``the top of the sample is denser than the bulk (excess 0.046 ± 0.002)``."""
     parameter, amplitude = effect.amplitudes[0], formula.fit.values[effect.name]
     factor, unit = shown_unit(parameter)
     size, sigma = factor * parameter.hold(amplitude), factor * formula.error(effect.name)
