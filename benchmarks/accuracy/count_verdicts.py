@@ -23,6 +23,7 @@ from benchmarks.accuracy.draw_accuracy import (
 BANDS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.11))  # of the scatter of p_m between samples
 POWER = 6.0  # standard deviations, from which a cause that nobody listed should be seen
 UNSEEN = 1.0  # the same, below which p_m makes up for a cause
+GAIN = 0.9  # of what the truth removes, that a right cause should
 OFTEN = ("bulk_modulus", "shear_strength")  # causes that are counted by themselves
 
 
@@ -62,7 +63,12 @@ def main() -> None:
     count(f"… a cause of less than {UNSEEN:g} σ, which p_m makes up for", table["in 90 %"][said & made_up])
     count("… all others", table["in 90 %"][said & ~made_up])
     count("… over all causes that are not excluded", table["in 90 % over causes"][said].dropna())
-    print("\nexpected calibration error")
+    share = table["share"][(table["exact"] | table["class"]) & ~null & ~told].dropna()
+    print(
+        f"\nof what the truth removes of held-out drops the right cause, or its class, removes {share.median():.2f} (median of "
+        f"{len(share)}; {int((share >= GAIN).sum())} of them {GAIN:g} or more)"
+    )
+    print("expected calibration error")
     for name, weight in (
         ("causes as frequent as the prior says", weigh_rows(table.hidden)),
         ("as drawn", table.P * 0 + 1),
