@@ -2,7 +2,7 @@
 
     python -m benchmarks.accuracy.interval_coverage OUT [--campaigns 60] [--samples 0.02] [--workers 2]
 
-Every campaign has 15 drops of four projectiles and two maps, with every nuisance that benchmarks.truths.measured knows,
+Every campaign has the drops of data/campaigns/p01 and two maps, with every nuisance that benchmarks.truths.measured knows,
 and a p_m of its own. Writes OUT/rows.jsonl, one line a campaign; a second call goes on. Prints coverage and the goodness of fit.
 """
 

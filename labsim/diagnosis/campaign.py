@@ -319,10 +319,14 @@ def diagnose_campaign(
             f"with {' + '.join(best.hypothesis)}: {text}"
             for text in warn_of_range(problem, best) + warn_unsettled(best)
         ]
+    named = [hypothesis for hypothesis, _ in found.verdict.named]
+    for fit in (fit for fit in found.rivals if fit.hypothesis in named and fit.hypothesis != best.hypothesis):
+        doubts += [f"with {' + '.join(fit.hypothesis)}: {text}" for text in warn_unsettled(fit)]
     if learned is not None:
         law = learned.best.fit
         doubts += [
-            f"with {' + '.join(law.hypothesis)}: {text}" for text in warn_of_range(learned.problem, law)
+            f"with {' + '.join(law.hypothesis)}: {text}"
+            for text in warn_of_range(learned.problem, law) + warn_unsettled(law)
         ]
     doubts += doubt_scales(seen.drops)
     return Diagnosis(

@@ -169,6 +169,8 @@ def campaign_diagnosis_summary(found: Diagnosis) -> dict[str, Any]:
                     }
                 parameters[full] = {**entry, "unit": parameter.unit}
         cause = {"causes": list(hypothesis), "probability": probability, "parameters": parameters}
+        if fit is not None:
+            cause["step_left_sigma"] = fit.unsettled  # of a fit at its best: nought
         if hypothesis == ("unknown",):
             cause["free_law"] = describe_unknown(found)
         causes.append(cause)
