@@ -179,35 +179,56 @@ def fit_formulas(
         near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
+    top = max((fit.evidence for fit in fits), default=nominal.evidence)
+    behind = leading is not None and leading.evidence > top + LEAST_GAIN
+    if leading is not None and behind and not _explains(fits):
+        # a listed cause explains more than any formula alone: what form a law has is told about it, not without it
+        fits = take_better([*fits, *fit_further(problem, [leading], [*fits, *sparse], units)])
+        fits = sorted(fits, key=lambda fit: -fit.evidence)
+    if not behind or not _explains(fits):
+        fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
     while not _explains(fits or [nominal]):
-        further = fit_further(problem, [*fits[:1], *([leading] if leading else [])], [*fits, *sparse])
+        bases = [*fits[:1], *([leading] if leading else [])]
+        further = fit_further(problem, bases, [*fits, *sparse], units)
         if not further:
             break
         fits = sorted(take_better([*fits, *further]), key=lambda fit: -fit.evidence)
     return fits
 
 
-def fit_further(problem: Problem, bases: Sequence[Fit], known: Sequence[Fit]) -> list[Fit]:
-    """Fits with one term more than each of ``bases`` has, of those that are LEAST_GAIN ahead of it and of all others: the best
-    single term of every place is tried on few runs, and what comes furthest has runs of its own. MOST_PARTS at most.
+def fit_further(
+    problem: Problem, bases: Sequence[Fit], known: Sequence[Fit], units: Mapping[str, float]
+) -> list[Fit]:
+    """Fits with one term more than each of ``bases`` has, of those that are LEAST_GAIN ahead of it and of all others. On few runs
+    the best single term of every place is tried, then MOST_TRIED others of the place that leads; what comes furthest has runs of
+    its own. MOST_PARTS at most.
 
-    known : fits of single terms, from which these begin.
+    known : fits of single terms, which say what is best at a place.
     """
-    singles: dict[str, Fit] = {}
+    singles: dict[str, str] = {}
     for fit in sorted(known, key=lambda fit: -fit.evidence):
-        if len(fit.hypothesis) == 1 and fit.hypothesis[0] in list_terms():
-            singles.setdefault(list_terms()[fit.hypothesis[0]].place, fit)
+        if len(fit.hypothesis) == 1 and fit.hypothesis[0] in units:
+            singles.setdefault(list_terms()[fit.hypothesis[0]].place, fit.hypothesis[0])
     top = max(fit.evidence for fit in (*bases, *known))
     found: list[Fit] = []
     for base in bases:
         if len(base.hypothesis) >= MOST_PARTS:
             continue
-        sparse: list[Fit] = []
-        for (name,) in (fit.hypothesis for fit in singles.values()):
-            if name not in base.hypothesis:
-                names = (*base.hypothesis, name)
-                sparse += _fit(problem, names, (base.log_p_m, base.values), base, sparse=True)
+
+        def add(name: str, start: Fit, size: float, base: Fit = base) -> list[Fit]:
+            begin = (start.log_p_m, {**start.values, name: size * units[name]})
+            return _fit(problem, (*base.hypothesis, name), begin, start, sparse=True)
+
+        sparse = [
+            fit for name in singles.values() if name not in base.hypothesis for fit in add(name, base, 0.0)
+        ]
+        if not sparse:
+            continue
+        best = max(sparse, key=lambda fit: fit.evidence)
+        *_, added = best.hypothesis
+        place, size = list_terms()[added].place, best.values[added] / units[added]
+        others = [name for name in units if list_terms()[name].place == place and name not in best.hypothesis]
+        sparse += [fit for name in others[:MOST_TRIED] for fit in add(name, best, size)]
         for start in sorted(sparse, key=lambda fit: -fit.evidence)[:MOST_SIBLINGS]:
             found += _fit(problem, start.hypothesis, (start.log_p_m, start.values), start)
     return [fit for fit in found if fit.evidence > top + LEAST_GAIN]
@@ -345,6 +366,8 @@ def _list_places(
     begun: dict[str, tuple[Fit, float]] = {}
     for fit in sorted((*fits, *sparse), key=lambda fit: -fit.evidence):
         for name in fit.hypothesis if fit.evidence > top - behind else ():
+            if name not in units:  # a listed cause
+                continue
             begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
     return begun
 
