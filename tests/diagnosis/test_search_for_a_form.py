@@ -112,3 +112,65 @@ def test_open_places_are_those_whose_free_law_explains_as_much() -> None:
     }
     unknown = UnknownFit(0.0, "", 0.0, np.zeros(1), evidences)
     assert set(learned_law.list_open_places(unknown)) == {"force of depth", "strength of depth"}
+
+
+# ---------------------------------------------------------------- a term beside another part
+
+TOGETHER = {  # ln evidence of what stands together
+    ("surface_crust", "viscous_drag"): 900.0,
+    ("surface_crust", "inertial_drag"): 940.0,
+    ("surface_crust", "inertial_drag", "stuck_mass"): 950.0,
+}
+CRUST = SimpleNamespace(
+    hypothesis=("surface_crust",), evidence=700.0, log_p_m=7.2, values={"surface_crust": 0.04}
+)
+
+
+@pytest.fixture
+def beside(monkeypatch):
+    """Hypotheses that were fitted, and on few runs or not; the set of those that explain the data."""
+    asked: list[tuple[tuple[str, ...], bool]] = []
+    explained: set[tuple[str, ...]] = set()
+
+    def fit(problem, names, start, *, nuisances, sparse=False):
+        asked.append((names, sparse))
+        evidence = TOGETHER.get(names, EVIDENCE.get(names[0], 10.0) if len(names) == 1 else 650.0)
+        values = {name: start[1].get(name, 0.0) or 0.2 for name in names}
+        return SimpleNamespace(hypothesis=names, evidence=evidence, log_p_m=start[0], values=values)
+
+    monkeypatch.setattr(learned_law, "fit_hypothesis", fit)
+    monkeypatch.setattr(
+        learned_law, "fit_from_strengths", lambda problem, nominal, names, top: make_fit(names[0])
+    )
+    monkeypatch.setattr(learned_law, "fit_anew", lambda *given: [])
+    monkeypatch.setattr(learned_law, "list_large_effects", lambda problem, fit: [])
+    monkeypatch.setattr(learned_law, "fit_p_value", lambda fit: 0.4 if fit.hypothesis in explained else 1e-9)
+    return asked, explained
+
+
+UNITS = {name: 1.0 for name, term in list_terms().items() if not term.acts.see}
+
+
+def test_a_law_is_told_about_the_listed_cause_that_explains_more_than_any_formula(beside) -> None:
+    asked, explained = beside
+    explained.add(("surface_crust", "inertial_drag"))
+    chosen = [("viscous_drag",), ("stuck_mass",), ("layer_at_1_mm",)]
+    fits = learned_law.fit_formulas(PROBLEM, NOMINAL, chosen, UNITS, (), CRUST)
+    # the form of the drag is found among those of its place, though another one was chosen alone
+    assert fits[0].hypothesis == ("surface_crust", "inertial_drag")
+    # what was tried alone is what was chosen: no form of every place
+    assert {names for names, _ in asked if len(names) == 1} <= set(chosen)
+    assert (("surface_crust", "inertial_drag"), True) in asked
+
+
+def test_a_formula_has_three_parts_at_most(beside) -> None:
+    base = SimpleNamespace(**{**vars(CRUST), "hypothesis": ("surface_crust", "inertial_drag"), "evidence": 940.0,
+                              "values": {"surface_crust": 0.04, "inertial_drag": 300.0}})  # fmt: skip
+    known = [make_fit("stuck_mass"), make_fit("viscous_drag")]
+    [found] = learned_law.fit_further(PROBLEM, [base], known, UNITS)
+    assert found.hypothesis == ("surface_crust", "inertial_drag", "stuck_mass")
+    assert learned_law.fit_further(PROBLEM, [found], known, UNITS) == []
+
+
+def test_a_part_that_is_not_clearly_ahead_is_left_out(beside) -> None:
+    assert learned_law.fit_further(PROBLEM, [CRUST], [make_fit("layer_at_1_mm")], UNITS) == []
