@@ -308,9 +308,8 @@ def diagnose_campaign(
     untestable = list_untestable(problem, about)
     learned = None
     if found.verdict.word == "unknown":
-        learned = learn_law(
-            problem, nominal, found.unknown, held_nominal, found.leading if found.rivals else None
-        )
+        listed = [fit for fit in found.rivals if set(fit.hypothesis) <= set(found.leading.hypothesis)]
+        learned = learn_law(problem, nominal, found.unknown, held_nominal, listed)
     doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]

@@ -155,7 +155,7 @@ def test_a_law_is_told_about_the_listed_cause_that_explains_more_than_any_formul
     asked, explained = beside
     explained.add(("surface_crust", "inertial_drag"))
     chosen = [("viscous_drag",), ("stuck_mass",), ("layer_at_1_mm",)]
-    fits = learned_law.fit_formulas(PROBLEM, NOMINAL, chosen, UNITS, (), CRUST)
+    fits = learned_law.fit_formulas(PROBLEM, NOMINAL, chosen, UNITS, (), [CRUST])
     # the form of the drag is found among those of its place, though another one was chosen alone
     assert fits[0].hypothesis == ("surface_crust", "inertial_drag")
     # what was tried alone is what was chosen: no form of every place

@@ -108,13 +108,14 @@ class LearnedLaw:
 
 
 def learn_law(
-    problem: Problem, nominal: Fit, unknown: UnknownFit, before: HeldOut, leading: Fit | None = None
+    problem: Problem, nominal: Fit, unknown: UnknownFit, before: HeldOut, listed: Sequence[Fit] = ()
 ) -> LearnedLaw | None:
     """The formulas that explain most, simulated and fitted; None where none explains more than the nominal model
     and gives held-out drops a higher probability, the best of them where its fit is repeated without them too; None where no law
     was left free.
 
-    before : the nominal model's predictions of held-out drops. leading : the listed cause, or pair, that explains most.
+    before : the nominal model's predictions of held-out drops. listed : the listed cause, or pair, that explains most, and the
+    parts of a pair by themselves.
     """
     tangents = unknown.tangents
     if tangents is None:
@@ -126,7 +127,7 @@ def learn_law(
     chosen = [names for names, _ in choose_formulas(weighed, terms)]
     ranked = dict.fromkeys([names[0] for names, _ in weighed if len(names) == 1] + list(terms))
     ordered = {name: units[name] for name in ranked}
-    fits = fit_formulas(free, nominal, chosen, ordered, list_open_places(unknown), leading)
+    fits = fit_formulas(free, nominal, chosen, ordered, list_open_places(unknown), listed)
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -134,8 +135,8 @@ def learn_law(
             gain = measure_gain(before, held_out)
             if not gain.log_score_difference < 0.0:  # a single drop leaves none to hold out
                 named = tuple(terms[name] for name in fit.hypothesis if name in terms)
-                listed = tuple(free.effects[name] for name in fit.hypothesis if name not in terms)
-                formulas.append(Formula(named, fit, held_out, gain, listed))
+                causes = tuple(free.effects[name] for name in fit.hypothesis if name not in terms)
+                formulas.append(Formula(named, fit, held_out, gain, causes))
     if not formulas:
         return None
     formulas.sort(key=lambda each: -each.fit.evidence)
@@ -157,11 +158,11 @@ def fit_formulas(
     chosen: Sequence[Hypothesis],
     units: Mapping[str, float],
     open_places: Collection[str] = (),
-    leading: Fit | None = None,
+    listed: Sequence[Fit] = (),
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
     them among runs about themselves. units : of all terms, those first that are weighed first; open_places : whose forms are
-    tried in any case; leading : what of the listed causes explains most, which a term may stand beside."""
+    tried in any case; listed : causes that explain most, which a term may stand beside."""
     simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
     sparse: list[Fit] = []
     for names in chosen:
@@ -180,16 +181,15 @@ def fit_formulas(
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
     top = max((fit.evidence for fit in fits), default=nominal.evidence)
-    behind = leading is not None and leading.evidence > top + LEAST_GAIN
-    if leading is not None and behind and not _explains(fits):
-        # a listed cause explains more than any formula alone: what form a law has is told about it, not without it
-        fits = take_better([*fits, *fit_further(problem, [leading], [*fits, *sparse], units)])
+    behind = any(fit.evidence > top + LEAST_GAIN for fit in listed)
+    if behind and not _explains(fits):
+        # listed causes explain more than any formula alone: what form a law has is told about them, not without them
+        fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
         fits = sorted(fits, key=lambda fit: -fit.evidence)
     if not behind or not _explains(fits):
         fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
     while not _explains(fits or [nominal]):
-        bases = [*fits[:1], *([leading] if leading else [])]
-        further = fit_further(problem, bases, [*fits, *sparse], units)
+        further = fit_further(problem, [*fits[:1], *listed], [*fits, *sparse], units)
         if not further:
             break
         fits = sorted(take_better([*fits, *further]), key=lambda fit: -fit.evidence)
