@@ -174,20 +174,19 @@ def fit_formulas(
             found = fit_from_strengths(problem, nominal, names, top)
             sparse += [found] if found is not None else []
     fits = _refine(problem, nominal, sparse, MOST_SIMULATED)
+    top = max((fit.evidence for fit in fits), default=nominal.evidence)
+    if any(fit.evidence > top + LEAST_GAIN for fit in listed) and not _explains(fits or [nominal]):
+        # listed causes explain more than any formula alone: what form a law has is told about them, not without them
+        fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
+        if _explains(fits or [nominal]):
+            return sorted(fits, key=lambda fit: -fit.evidence)
     if not _explains(fits or [nominal]):
         best = max(fits, key=lambda fit: fit.evidence, default=nominal)
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
         near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    top = max((fit.evidence for fit in fits), default=nominal.evidence)
-    behind = any(fit.evidence > top + LEAST_GAIN for fit in listed)
-    if behind and not _explains(fits):
-        # listed causes explain more than any formula alone: what form a law has is told about them, not without them
-        fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
-        fits = sorted(fits, key=lambda fit: -fit.evidence)
-    if not behind or not _explains(fits):
-        fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
+    fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
     while not _explains(fits or [nominal]):
         further = fit_further(problem, [*fits[:1], *listed], [*fits, *sparse], units)
         if not further:
