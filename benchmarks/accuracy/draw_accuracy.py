@@ -11,7 +11,6 @@ hold where causes are as frequent as the prior says.
 from __future__ import annotations
 
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -56,16 +55,14 @@ def find_interval(right: int, of: int) -> tuple[float, float]:
 
 def bin_verdicts(said: pd.Series, right: pd.Series) -> list[tuple[float, int, int]]:
     """Of each of BINS that has verdicts: the mean probability that is said, how many are right, how many there are."""
-    bins = [(said > low) & (said <= high) for low, high in pairwise(BINS)]
-    return [
-        (float(said[each].mean()), int(right[each].sum()), int(each.sum())) for each in bins if each.any()
-    ]
+    bins = right.groupby(pd.cut(said, BINS), observed=True)
+    return [(float(said[each.index].mean()), int(each.sum()), len(each)) for _, each in bins]
 
 
 def find_calibration_error(said: pd.Series, right: pd.Series, weight: pd.Series) -> float:
     """Expected: the mean distance of the probability that is said from the share that is right, over BINS."""
     distance = weight * (said - right.astype(float))
-    return float(distance.groupby(pd.cut(said, BINS)).sum().abs().sum() / weight.sum())
+    return float(distance.groupby(pd.cut(said, BINS), observed=True).sum().abs().sum() / weight.sum())
 
 
 def expect_calibration_error(said: pd.Series, weight: pd.Series, draws: int = 1000) -> tuple[float, float]:

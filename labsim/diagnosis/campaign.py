@@ -313,20 +313,15 @@ def diagnose_campaign(
     doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]
+    doubted: list[tuple[Fit, list[str]]] = []
     if best is not nominal:
-        doubts += [
-            f"with {' + '.join(best.hypothesis)}: {text}"
-            for text in warn_of_range(problem, best) + warn_unsettled(best)
-        ]
-    named = [hypothesis for hypothesis, _ in found.verdict.named]
-    for fit in (fit for fit in found.rivals if fit.hypothesis in named and fit.hypothesis != best.hypothesis):
-        doubts += [f"with {' + '.join(fit.hypothesis)}: {text}" for text in warn_unsettled(fit)]
+        doubted.append((best, warn_of_range(problem, best) + warn_unsettled(best)))
+    named = {hypothesis for hypothesis, _ in found.verdict.named} - {best.hypothesis}
+    doubted += [(fit, warn_unsettled(fit)) for fit in found.rivals if fit.hypothesis in named]
     if learned is not None:
         law = learned.best.fit
-        doubts += [
-            f"with {' + '.join(law.hypothesis)}: {text}"
-            for text in warn_of_range(learned.problem, law) + warn_unsettled(law)
-        ]
+        doubted.append((law, warn_of_range(learned.problem, law) + warn_unsettled(law)))
+    doubts += [f"with {' + '.join(fit.hypothesis)}: {text}" for fit, texts in doubted for text in texts]
     doubts += doubt_scales(seen.drops)
     return Diagnosis(
         **{each.name: getattr(found, each.name) for each in fields(Judgement)},

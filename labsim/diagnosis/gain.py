@@ -173,15 +173,15 @@ def predict_held_out(
     drops, pull, _precision = _hold_out(problem, fit, known, groups)
     for (drop, lengths), records in zip(drops, groups, strict=True):
         error = drop.miss(fit.drops.residual, pull)
-        ends = np.cumsum([held[name] for name in records])[:-1]
-        missed = np.split(lengths @ error, ends)
-        by_record |= {name: math.sqrt(np.mean(part**2)) for name, part in zip(records, missed, strict=True)}
+        missed = lengths @ error
+        parts = np.split(missed, np.cumsum([held[name] for name in records])[:-1])
+        by_record |= {name: math.sqrt(np.mean(part**2)) for name, part in zip(records, parts, strict=True)}
         lower = np.linalg.cholesky(drop.spread)
         white = np.linalg.solve(lower, error)
         score.append(
             -0.5 * white @ white - np.sum(np.log(np.diag(lower))) - 0.5 * error.size * math.log(2 * math.pi)
         )
-        rms.append(math.sqrt(np.mean((lengths @ error) ** 2)))
+        rms.append(math.sqrt(np.mean(missed**2)))
         expected.append(math.sqrt(np.mean(np.diag(lengths @ drop.spread @ lengths.T))))
         count.append(error.size)
     return HeldOut(

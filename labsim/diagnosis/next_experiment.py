@@ -96,7 +96,10 @@ def suggest_between_formulas(learned: LearnedLaw) -> list[Suggestion]:
     standing = [each for each in learned.formulas if probabilities[each.fit.hypothesis] > SMALLEST]
     if len(standing) < 2:
         return []
-    tells = tuple(tuple(term.title for term in each.terms) for each in standing)
+    tells = tuple(
+        tuple([cause.title for cause in each.causes] + [term.title for term in each.terms])
+        for each in standing
+    )
     found = suggest(learned.problem, [each.fit for each in standing], probabilities)
     return [replace(each, tells=tells) for each in found]
 

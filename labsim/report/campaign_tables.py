@@ -15,6 +15,7 @@ from ..diagnosis.campaign import Diagnosis
 from ..diagnosis.gain import Gain
 from ..diagnosis.judge import MOST_NAMED
 from ..diagnosis.misfit import say_misfit
+from ..effects import Effect
 from ..effects.model import Model
 from ..effects.terms import Law
 from ..inference.calibrate import Calibration
@@ -417,6 +418,15 @@ def _say_untestable(found: Diagnosis) -> list[str]:
     ]
 
 
+def _state_effects(
+    fit: Fit, effects: Sequence[Effect], problem: Problem
+) -> tuple[tuple[str, dict[str, float]], ...]:
+    """Effects as a model.toml holds them: all their parameters, at the amplitudes of a fit."""
+    return tuple(
+        (effect.name, effect.at(problem.at(effect.name, fit.values[effect.name]))) for effect in effects
+    )
+
+
 def extended_model(found: Diagnosis) -> Model:
     """The extension as model.toml holds it: the cause, or the law that was learned in its place."""
     if found.verdict.word == "unknown" and found.learned is not None:
@@ -424,16 +434,10 @@ def extended_model(found: Diagnosis) -> Model:
         terms = tuple(
             (term.name, float(c)) for term, c in zip(learned.terms, learned.coefficients, strict=True)
         )
-        listed = tuple(
-            (effect.name, effect.at(found.problem.at(effect.name, learned.fit.values[effect.name])))
-            for effect in learned.causes
-        )
+        listed = _state_effects(learned.fit, learned.causes, found.problem)
         return Model(math.exp(learned.fit.log_p_m), listed, law=Law(terms))
-    effects = tuple(
-        (name, found.problem.effects[name].at(found.problem.at(name, found.best.values[name])))
-        for name in (found.best.hypothesis if found.verdict.word == "effect" else ())
-    )
     fit = found.best if found.verdict.word == "effect" else found.nominal
+    effects = _state_effects(fit, [found.problem.effects[name] for name in fit.hypothesis], found.problem)
     wobble = found.unknown.find_wobble(found.nominal) if found.verdict.word == "unknown" else None
     log_p_m = wobble.log_p_m if wobble is not None else fit.log_p_m
     return Model(p_m=math.exp(log_p_m), effects=effects, matter=Path(found.campaign.material.law).stem)

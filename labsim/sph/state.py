@@ -35,6 +35,7 @@ LOG = (
     "shaft",
 )
 
+REST = 1.0e-3  # m/s: forces that fade at rest fade below it
 TIP, SPEED, TIME, FRICTION, LAST_STEP = range(5)  # what the array ``body`` holds: m, m/s (upwards), s, J, s
 
 

@@ -30,6 +30,7 @@ from labsim.effects.terms import list_terms
 from labsim.errors import ExtrapolationError
 from labsim.inference.fits.fitting import Fit, fit_hypothesis
 from labsim.inference.fits.tangents import linearise_at
+from labsim.inference.observations.linearised_drop import ErrorBudget
 from labsim.inference.observations.observe import observe_drops
 from labsim.inference.open_problem import open_problem
 from labsim.inference.problem import Problem
@@ -45,11 +46,19 @@ GAIN = measure_gain(NOTHING, NOTHING)
 @pytest.fixture(scope="module")
 def fitted(shared_store) -> tuple[Problem, Fit, Fit]:
     drops = tuple(drop for drop in CAMPAIGN.drops if drop.name in ("D01", "D02", "D03", "D05", "D06", "D07"))
-    campaign = replace(CAMPAIGN, drops=drops, scans=())
+    # a rod that is known exactly, and samples that scatter a little more: the friction is small, and at work
+    rod = replace(drops[0].projectile, mass_sigma=0.0)
+    campaign = replace(CAMPAIGN, drops=tuple(replace(drop, projectile=rod) for drop in drops), scans=())
     chosen = {name: list_effects(campaign)[name] for name in ("pixel_scale", "side_friction")}
     chosen["side_friction"] = replace(chosen["side_friction"], without="with a waisted rod")
     problem = open_problem(
-        campaign, RunStore(shared_store), chosen, workers=1, drops=observe_drops(campaign)[0], cells=4
+        campaign,
+        RunStore(shared_store),
+        chosen,
+        budget=ErrorBudget(scatter=0.025),
+        workers=1,
+        drops=observe_drops(campaign)[0],
+        cells=4,
     )
     nominal = fit_hypothesis(problem, (), (math.log(1300.0), {}))
     begin = nominal.log_p_m, {"side_friction": 0.3}
@@ -149,7 +158,7 @@ def test_a_drop_without_the_cause_is_a_drop_of_the_nominal_model(fitted, planned
         at_work = usual.table.features(friction.log_p_m, usual.start.log_speed, friction.values)
         deeper = math.exp(plain[0]) - math.exp(at_work[0])
         gone = of_friction[speeds + k].depth - of_friction[k].depth
-        assert gone == pytest.approx(deeper, rel=0.1) and deeper > 1e-3 * math.exp(plain[0])
+        assert gone == pytest.approx(deeper, rel=0.1) and deeper > 1.5e-3 * math.exp(plain[0])
     assert friction.log_p_m < nominal.log_p_m and extended.tracks.models[-1].radius > 0.0
 
 
@@ -210,9 +219,8 @@ def learned(fitted) -> LearnedLaw:
     """Two drags, either 300 Pa at 0.65 m/s, as formulas that the data tell apart by 1 in ln evidence."""
     problem, nominal, _ = fitted
     terms = [list_terms()[name] for name in ("inertial_drag", "viscous_drag")]
-    free = replace(
-        problem, effects={**problem.effects, **{term.name: make_effect(term, 500.0) for term in terms}}
-    )
+    effects = {**problem.effects, **{term.name: make_effect(term, 500.0) for term in terms}}
+    free = replace(problem, effects=effects, budget=ErrorBudget())  # samples that scatter by 2 %
     formulas = []
     for term, evidence, size in zip(terms, (-1.0, -2.0), (300.0 / 0.65**2, 300.0 / 0.65), strict=True):
         begin = nominal.log_p_m, {term.name: size}
@@ -227,14 +235,23 @@ def test_formulas_are_told_apart_by_the_drops_that_they_differ_in(learned) -> No
     told = ", to tell a drag that grows with the square of the speed from a drag that grows with the speed"
     assert all(each.text.endswith(told) for each in found)
     (drop,) = [each for each in found if each.change.startswith("one more drop")]
-    # they were made alike at 0.65 m/s: they differ most in the slowest and in the fastest drop
-    assert "at 0.22 m/s" in drop.change or "at 1.22 m/s" in drop.change
+    assert "at 1.22 m/s" in drop.change  # the fastest: they were made alike at 0.65 m/s
     (first, of_first), (second, of_second) = drop.predictions
     assert (first, second) == ("inertial_drag", "viscous_drag")
-    assert abs(of_first.depth - of_second.depth) > of_first.depth_sigma
+    assert of_first.depth < of_second.depth - of_first.depth_sigma and of_first.stop < of_second.stop
     assert {"depth_mm", "stopping_time_ms"} <= set(of_first.summarise())
     # three in four of the time one is right: other projectiles are asked for
     assert any("another projectile" in each.change for each in found)
+
+
+def test_formulas_with_one_term_are_told_apart_by_the_causes_beside_it(learned) -> None:
+    first, second = learned.formulas
+    friction = replace(second, terms=first.terms, causes=(list_effects()["side_friction"],))
+    found = suggest_between_formulas(replace(learned, formulas=(first, friction)))
+    assert found[0].tells == (
+        ("a drag that grows with the square of the speed",),
+        (list_effects()["side_friction"].title, "a drag that grows with the square of the speed"),
+    )
 
 
 def test_a_formula_that_stands_alone_asks_for_nothing(learned) -> None:

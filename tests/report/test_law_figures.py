@@ -20,7 +20,7 @@ LAWS = tuple(RecoveredLaw(law, np.zeros(len(law.knots)), np.eye(len(law.knots)))
 
 def a_formula(**coefficients: float) -> Formula:
     """Each coefficient to a tenth; the first two go together by a half."""
-    terms = tuple(list_terms()[name] for name in coefficients)
+    terms = tuple(list_terms()[name] for name in coefficients if name in list_terms())
     sigma = np.array([0.0, *(0.1 * abs(c) for c in coefficients.values())])
     correlation = np.eye(len(sigma))
     correlation[1, 2:3] = correlation[2:3, 1] = 0.5
@@ -57,6 +57,16 @@ def test_the_band_of_a_formula_counts_how_its_coefficients_go_together():
     _, sigma = a_formula(hardening=-0.5).trace(STRENGTH, np.array([0.18, 0.2]))
     np.testing.assert_allclose(sigma, [0.0, 0.01], atol=1e-12)
     assert a_formula(hardening=-0.5).trace(SPEED, place) is None
+
+
+def test_the_band_beside_a_listed_cause_is_the_term_s_own():
+    """A cause stands before the terms of a fit, and has a coefficient and an error too."""
+    both = a_formula(surface_crust=0.04, viscous_drag=50.0)
+    place = np.array([0.5, 1.0])
+    value, sigma = both.trace(SPEED, place)
+    np.testing.assert_allclose(value, 50.0 * place)
+    np.testing.assert_allclose(sigma, 5.0 * place)
+    np.testing.assert_allclose(both.sigma, [5.0])
 
 
 def test_a_place_without_a_term_has_no_curve():

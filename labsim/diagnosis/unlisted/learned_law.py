@@ -68,22 +68,21 @@ class Formula:
 
     @property
     def sigma(self) -> FloatArray:
-        return np.array([self.error(term.name) for term in self.terms])
+        return np.sqrt(np.diag(self.covariance(*self.terms)))
 
-    def error(self, name: str) -> float:
-        """Standard deviation of the coefficient of a term, or of the amplitude of a cause."""
-        return math.sqrt(
-            self.fit.covariance[1 + self.fit.hypothesis.index(name), 1 + self.fit.hypothesis.index(name)]
-        )
+    def covariance(self, *parts: Term | Effect) -> FloatArray:
+        """Of the coefficients of terms and the amplitudes of causes, in the order asked."""
+        places = [1 + self.fit.hypothesis.index(part.name) for part in parts]
+        return self.fit.covariance[np.ix_(places, places)]
 
     def trace(self, law: FreeLaw, places: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """What it adds at places of a law, and its standard deviation, in the law's unit; None where it adds nothing there."""
-        own = [k for k, term in enumerate(self.terms) if term.place == law.name]
+        own = [term for term in self.terms if term.place == law.name]
         if not own:
             return None
-        shapes = np.stack([shape_at(self.terms[k], law, places) for k in own])
-        spread = self.fit.covariance[1:, 1:][np.ix_(own, own)]
-        return self.coefficients[own] @ shapes, np.sqrt(np.einsum("in,ij,jn->n", shapes, spread, shapes))
+        shapes = np.stack([shape_at(term, law, places) for term in own])
+        value = np.array([self.fit.values[term.name] for term in own]) @ shapes
+        return value, np.sqrt(np.einsum("in,ij,jn->n", shapes, self.covariance(*own), shapes))
 
 
 @dataclass(frozen=True)
@@ -174,14 +173,14 @@ def fit_formulas(
             found = fit_from_strengths(problem, nominal, names, top)
             sparse += [found] if found is not None else []
     fits = _refine(problem, nominal, sparse, MOST_SIMULATED)
-    top = max((fit.evidence for fit in fits), default=nominal.evidence)
-    if any(fit.evidence > top + LEAST_GAIN for fit in listed) and not _explains(fits or [nominal]):
-        # listed causes explain more than any formula alone: what form a law has is told about them, not without them
-        fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
-        if _explains(fits or [nominal]):
-            return sorted(fits, key=lambda fit: -fit.evidence)
     if not _explains(fits or [nominal]):
         best = max(fits, key=lambda fit: fit.evidence, default=nominal)
+        if any(fit.evidence > best.evidence + LEAST_GAIN for fit in listed):
+            # they explain more than any formula alone: what form a law has is told about them, not without them
+            fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
+            if _explains(fits):
+                return sorted(fits, key=lambda fit: -fit.evidence)
+            best = max(fits, key=lambda fit: fit.evidence, default=nominal)
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
         near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
@@ -204,33 +203,43 @@ def fit_further(
 
     known : fits of single terms, which say what is best at a place.
     """
-    singles: dict[str, str] = {}
-    for fit in sorted(known, key=lambda fit: -fit.evidence):
-        if len(fit.hypothesis) == 1 and fit.hypothesis[0] in units:
-            singles.setdefault(list_terms()[fit.hypothesis[0]].place, fit.hypothesis[0])
+    alone = [fit for fit in known if len(fit.hypothesis) == 1]
+    singles = [fit.hypothesis[0] for fit, _ in _list_places(alone, (), units, math.inf).values()]
+    found = [
+        fit
+        for base in bases
+        if len(base.hypothesis) < MOST_PARTS
+        for fit in _fit_beside(problem, base, singles, units)
+    ]
     top = max(fit.evidence for fit in (*bases, *known))
-    found: list[Fit] = []
-    for base in bases:
-        if len(base.hypothesis) >= MOST_PARTS:
-            continue
-
-        def add(name: str, start: Fit, size: float, base: Fit = base) -> list[Fit]:
-            begin = (start.log_p_m, {**start.values, name: size * units[name]})
-            return _fit(problem, (*base.hypothesis, name), begin, start, sparse=True)
-
-        sparse = [
-            fit for name in singles.values() if name not in base.hypothesis for fit in add(name, base, 0.0)
-        ]
-        if not sparse:
-            continue
-        best = max(sparse, key=lambda fit: fit.evidence)
-        *_, added = best.hypothesis
-        place, size = list_terms()[added].place, best.values[added] / units[added]
-        others = [name for name in units if list_terms()[name].place == place and name not in best.hypothesis]
-        sparse += [fit for name in others[:MOST_TRIED] for fit in add(name, best, size)]
-        for start in sorted(sparse, key=lambda fit: -fit.evidence)[:MOST_SIBLINGS]:
-            found += _fit(problem, start.hypothesis, (start.log_p_m, start.values), start)
     return [fit for fit in found if fit.evidence > top + LEAST_GAIN]
+
+
+def _fit_beside(problem: Problem, base: Fit, singles: Sequence[str], units: Mapping[str, float]) -> list[Fit]:
+    """A fit with one of some terms more, and with others of its place; those that come furthest with runs of their own."""
+
+    def add(name: str, start: Fit, size: float) -> list[Fit]:
+        begin = (start.log_p_m, {**start.values, name: size * units[name]})
+        return _fit(problem, (*base.hypothesis, name), begin, start, sparse=True)
+
+    sparse = [fit for name in singles if name not in base.hypothesis for fit in add(name, base, 0.0)]
+    if not sparse:
+        return []
+    best = max(sparse, key=lambda fit: fit.evidence)
+    *_, added = best.hypothesis
+    others = _list_forms(list_terms()[added].place, units, best.hypothesis)
+    sparse += [fit for name in others for fit in add(name, best, best.values[added] / units[added])]
+    return [
+        fit
+        for start in sorted(sparse, key=lambda fit: -fit.evidence)[:MOST_SIBLINGS]
+        for fit in _fit(problem, start.hypothesis, (start.log_p_m, start.values), start)
+    ]
+
+
+def _list_forms(place: str, units: Mapping[str, float], known: Collection[str]) -> list[str]:
+    """The first MOST_TRIED terms of a place, as ``units`` has them in order, beside those that are known."""
+    names = [name for name in units if list_terms()[name].place == place and name not in known]
+    return names[:MOST_TRIED]
 
 
 def fit_anew(
@@ -310,10 +319,9 @@ def fit_siblings(
             return _refine_leading(problem, found, MOST_REFINED, refined)
         seen.add(place)
         start, size = begun[place]
-        known = {fit.hypothesis for fit in found}
-        names = [name for name in units if list_terms()[name].place == place and (name,) not in known]
+        known = {fit.hypothesis[0] for fit in found if len(fit.hypothesis) == 1}
         siblings: list[Fit] = []
-        for name in names[:MOST_TRIED]:
+        for name in _list_forms(place, units, known):
             begin = (start.log_p_m, {name: size * units[name]})
             with suppress(LabsimError):
                 siblings.append(
@@ -364,10 +372,9 @@ def _list_places(
     top = max((fit.evidence for fit in fits), default=math.inf)
     begun: dict[str, tuple[Fit, float]] = {}
     for fit in sorted((*fits, *sparse), key=lambda fit: -fit.evidence):
-        for name in fit.hypothesis if fit.evidence > top - behind else ():
-            if name not in units:  # a listed cause
-                continue
-            begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
+        for name in fit.hypothesis:
+            if name in units and fit.evidence > top - behind:  # no listed cause
+                begun.setdefault(list_terms()[name].place, (fit, fit.values[name] / units[name]))
     return begun
 
 

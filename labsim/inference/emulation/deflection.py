@@ -20,6 +20,7 @@ from scipy.interpolate import CubicSpline
 from ...records import FloatArray
 from ...runs.parts import Motion
 from ...sph import DropSetting
+from ...sph.state import REST
 
 FORCES = (
     "force_of_depth",
@@ -33,7 +34,6 @@ FORCES = (
 STEPS, LONGEST = 150, 4  # a stopping time; stopping times without the law within which a drop has to stop
 BEYOND = 0.44  # of ln v0, past the slowest and the fastest run: farther away nothing is known
 SAMPLED, DEEPER = 2000, 2.0  # places at which a law is known; how far down, in depths of the deepest run
-REST = 1e-3  # m/s: a force of the speed fades below it, as in a simulation
 TOWARDS_STOP = np.linspace(0.0, 1.0, 41)  # stopping times
 
 

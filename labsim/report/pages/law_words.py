@@ -195,10 +195,9 @@ def _say_listed(formula: Formula, effect: Effect) -> str:
     """``the top of the sample is denser than the bulk (excess 0.046 ± 0.002)``."""
     parameter, amplitude = effect.amplitudes[0], formula.fit.values[effect.name]
     factor, unit = shown_unit(parameter)
-    size, sigma = factor * parameter.hold(amplitude), factor * formula.error(effect.name)
-    digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
+    sigma = math.sqrt(formula.covariance(effect)[0, 0])
     title = effect.say(parameter.hold(amplitude))
-    amount = f"{show_number(size, f'{{:.{digits}f}}')} ± {sigma:.{digits}f} {unit}".rstrip()
+    amount = f"{_say_value(factor * parameter.hold(amplitude), factor * sigma)} {unit}".rstrip()
     return f"{title[0].lower()}{title[1:]} ({parameter.name.replace('_', ' ')} {amount})"
 
 
@@ -224,12 +223,16 @@ def _say_terms(formula: Formula) -> list[str]:
     """Each term without its place: ``(513 ± 49) Pa s²/m² × v²``."""
     said = []
     for term, c, sigma in zip(formula.terms, formula.coefficients, formula.sigma, strict=True):
-        digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
         unit = "" if term.unit == "1" else f" {term.unit}"
         times = "" if term.formula == "1" else f" × {term.formula}"
-        size = show_number(float(c), f"{{:.{digits}f}}")
-        said.append(f"({size} ± {sigma:.{digits}f}){unit}{times}")
+        said.append(f"({_say_value(float(c), float(sigma))}){unit}{times}")
     return said
+
+
+def _say_value(value: float, sigma: float) -> str:
+    """``513 ± 49``: a standard deviation with two digits."""
+    digits = max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 3
+    return f"{show_number(value, f'{{:.{digits}f}}')} ± {sigma:.{digits}f}"
 
 
 def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
@@ -248,7 +251,7 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
             {
                 "effect": effect.name,
                 **found.problem.at(effect.name, best.fit.values[effect.name]),
-                "sd": best.error(effect.name),
+                "sd": math.sqrt(best.covariance(effect)[0, 0]),
             }
             for effect in best.causes
         ],

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._jit import compiled_loop
 from ..materials.porous_dust import update  # another law: `load_loop` puts its name here
-from ..state import FRICTION, LAST_STEP, SPEED, TIME, TIP
+from ..state import FRICTION, LAST_STEP, REST, SPEED, TIME, TIP
 from .gradients import (
     bound_step,
     carry_stress,
@@ -30,7 +30,6 @@ from .projectile import (
 )
 
 EIGHT = np.uint64(WIDTH)
-REST = 1.0e-3  # m/s: forces that fade at rest fade below it
 BLOCK = np.uint64(
     128
 )  # particles between two sums over neighbours at a time; unsigned, or no loop is vectorised
