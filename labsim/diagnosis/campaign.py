@@ -47,7 +47,7 @@ from .next_experiment import Suggestion, suggest, suggest_between_formulas
 from .pairs import confirm_pairs, refine_leading, return_to_singles
 from .screen import CLOSE, Score, Screening, draw_strengths, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
-from .unlisted.free_law import fit_hats, needs_free_law
+from .unlisted.free_law import fit_hats, simulate_hats, weigh_beside
 from .unlisted.learned_law import LearnedLaw, learn_law
 from .unlisted.unknown import UnknownFit, fit_unknown
 from .untestable import Combination, Untestable, find_combination, list_untestable
@@ -155,8 +155,11 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
         predicted = check_leading(problem, leading, np.random.default_rng(seed))
     # the laws without a name are those of drops
     explained = problem.pushed or unknown.find_wobble(nominal) is not None
-    if not explained and needs_free_law(p_value, rivals, unknown.evidence, predicted):
-        unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal))
+    if not explained and p_value < REJECTED:
+        hats = simulate_hats(problem, nominal)
+        unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal, hats))
+        if rivals:
+            unknown = replace(unknown, beside=weigh_beside(hats, leading))
     verdict = judge(
         nominal,
         rivals,
@@ -165,6 +168,7 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
         {score.name: score.log_bayes for score in screening.scores},
         predicted,
         _list_rough(problem),
+        unknown.beside,
         1.0 if problem.pushed or problem.felt else NESTED,  # that was measured on films
     )
     first = verdict.probabilities[0][0]

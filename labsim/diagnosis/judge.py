@@ -82,6 +82,7 @@ def judge(
     screened: Mapping[str, float],
     predicted: float = 1.0,
     rough: Collection[str] = (),
+    beside: float = -math.inf,
     unknown_softness: float = NESTED,
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
@@ -91,8 +92,9 @@ def judge(
     are told apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands
     first.
 
-    rough : causes behind which ROUGH_TEMPERATURE holds. unknown_softness : by which what unknown and the best cause differ by is
-    divided.
+    beside : ln Bayes factor of a free law on top of the best cause over that cause alone. That something unlisted is at work too
+    is as likely beforehand as that it is at work alone. rough : causes behind which ROUGH_TEMPERATURE holds. unknown_softness :
+    by which what unknown and the best cause differ by is divided, and what is beside.
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
     p value of held-out drops with the best cause, or of its own data. Where they are missed, unknown stands to that cause at
     least as its prior does to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p):
@@ -103,6 +105,8 @@ def judge(
     of_unknown = unknown_evidence - nominal.evidence
     full = [weigh_prior(hypothesis, catalogue) + value for hypothesis, value in gain.items()]
     full.append(math.log(PRIOR_UNKNOWN) + of_unknown)
+    if gain:
+        full.append(math.log(PRIOR_UNKNOWN) + max(full[:-1]) + beside)
     most = max([0.0, *gain.values()])
     top = max(most, of_unknown)
     lead = top - (top - most) / unknown_softness
@@ -128,6 +132,10 @@ def judge(
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
         first = max(weight[hypothesis] for hypothesis in gain)
         weight[("unknown",)] = max(weight[("unknown",)], first + odds)
+    if gain:
+        further = math.log(PRIOR_UNKNOWN) + max(beside, 0.0) / unknown_softness + min(beside, 0.0)
+        first = max(weight[hypothesis] for hypothesis in gain)
+        weight[("unknown",)] = float(np.logaddexp(weight[("unknown",)], first + further))
     spread = logsumexp(full) - logsumexp(list(weight.values()))
     weight = {hypothesis: value + spread for hypothesis, value in weight.items()}
     weight[("none",)] = weigh_prior((), catalogue)

@@ -25,7 +25,14 @@ from ..inference.problem import Problem
 from ..inference.published.calibrate import summarise
 from ..records import Campaign, FloatArray
 from ..sph import solver_hash
-from .pages.law_words import comes_nearest, describe_learned, describe_unknown, say_learned, say_missing
+from .pages.law_words import (
+    comes_nearest,
+    describe_learned,
+    describe_unknown,
+    say_learned,
+    say_missing,
+    say_nearest,
+)
 from .pages.phrases import (
     CERTAIN,
     say_amount,
@@ -266,12 +273,7 @@ def say_verdict(found: Diagnosis) -> str:
     """The verdict as a laboratory can act on it, in two sentences; numbers are medians of the posteriors."""
     best, probability = found.verdict.probabilities[0]
     if found.verdict.word == "unknown":
-        missing = f"what is missing {say_missing(found)}"
-        if comes_nearest(found):
-            missing = (
-                f"{say_hypothesis(found.best.hypothesis)} comes nearest, but does not predict drops that no fit has seen "
-                f"({state_p_value(found.predicted)})"
-            )
+        missing = say_nearest(found) if comes_nearest(found) else f"what is missing {say_missing(found)}"
         return (
             "The simulation is wrong in a way that no listed cause explains (probability "
             f"{say_probability(probability)}): {missing}."

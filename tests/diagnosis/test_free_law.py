@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from labsim.campaign import read_campaign
 from labsim.diagnosis.campaign import judge_campaign
 from labsim.diagnosis.gain import predict_held_out
 from labsim.diagnosis.unlisted import free_law
-from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate, needs_free_law
+from labsim.diagnosis.unlisted.free_law import EMBEDDED, Tangents, average, gather, integrate
 from labsim.diagnosis.unlisted.hats import FreeLaw, make_hats
 from labsim.diagnosis.unlisted.learned_law import learn_law, list_open_places
 from labsim.diagnosis.unlisted.unknown import FREEDOMS, WOBBLE
@@ -84,6 +83,24 @@ def test_the_integral_is_that_of_the_covariance(size: float) -> None:
     assert found.coefficients[1:] == pytest.approx(size**2 * free.T @ weighted[0], rel=1e-8)
 
 
+def test_a_law_on_top_of_a_cause_is_weighed_in_what_that_cannot_explain() -> None:
+    """ln p_m and the cause are flat: what they can explain is taken out of data and hats by an orthogonal matrix."""
+    rng = np.random.default_rng(8)
+    names = ["cause", "a", "b"]
+    block = a_block(rng, 40, ["ln_p_m", *names])
+    gram, log_determinant, points = gather([block], names, dict.fromkeys(names, 1.0))
+    found = Tangents((), ("ln_p_m", *names), gram, log_determinant, points, np.zeros((0, 3)), 0.0)
+    with_it, without = (integrate(found, hats, 0.5, flat=["cause"]) for hats in (["a", "b"], []))
+    white = block.whiten(np.stack([block.residual, *(block.tangents[n] for n in ("ln_p_m", *names))], axis=1))
+    left = np.linalg.qr(white[:, 1:3], mode="complete")[0][:, 2:].T @ white[:, [0, 3, 4]]
+    residual, hats = left[:, 0], left[:, 1:]
+    covariance = np.eye(38) + 0.25 * hats @ hats.T
+    gained = 0.5 * residual @ residual - 0.5 * residual @ np.linalg.solve(covariance, residual)
+    gained -= 0.5 * np.linalg.slogdet(covariance)[1]
+    assert with_it.evidence - without.evidence == pytest.approx(gained, rel=1e-9)
+    assert len(with_it.coefficients) == 4 and len(without.coefficients) == 2
+
+
 @pytest.mark.parametrize("limits", [(6.8, 7.1), (8.0, 9.0)])
 def test_the_integral_ends_at_the_limits_of_p_m(limits: tuple[float, float]) -> None:
     """Evidence and means, by sums over ln p_m of what the coefficients give there."""
@@ -126,27 +143,6 @@ def test_a_law_over_sizes_is_as_wide_as_they_differ() -> None:
     variance += (1 - share) * each[0].covariance[1, 1] + share * each[1].covariance[1, 1]
     assert one.sigma[0] == pytest.approx(math.sqrt(variance))
     assert one.at(np.array([0.15, 0.165, 0.18]))[0] == pytest.approx(mean[1] * np.array([1.0, 0.5, 0.0]))
-
-
-@pytest.mark.parametrize(
-    ("p_value", "best", "predicted", "wanted"),
-    [
-        (0.5, None, 1.0, False),  # nothing is wrong
-        (0.001, None, 1.0, True),
-        (0.001, (0.5, 40.0), 0.3, False),  # a listed cause fits, far ahead
-        (0.001, (0.5, 25.0), 0.3, True),  # fits, but hardly better than a law without a place
-        (0.001, (0.01, 40.0), 0.3, True),  # best of those listed, and does not fit
-        (0.001, (0.5, 40.0), 0.01, True),  # fits, but does not predict held-out drops
-    ],
-)
-def test_runs_of_hats_are_made_only_where_they_can_matter(
-    monkeypatch, p_value, best, predicted, wanted
-) -> None:
-    rivals = []
-    if best is not None:
-        monkeypatch.setattr(free_law, "fit_p_value", lambda fit: best[0])
-        rivals = [SimpleNamespace(evidence=best[1]), SimpleNamespace(evidence=0.0)]
-    assert needs_free_law(p_value, rivals, 20.0, predicted) is wanted
 
 
 # ---------------------------------------------------------------- the hats

@@ -78,6 +78,22 @@ def test_unknown_is_softened_as_a_part_of_a_pair_is_and_none_counts_in_full(unkn
     assert found["none",] == pytest.approx(PRIOR_NONE / (PRIOR_NONE + full))
 
 
+@pytest.mark.parametrize("beside", [-3.0, 0.0, 4.0, 12.0])
+def test_what_is_unlisted_may_be_at_work_on_top_of_the_best_cause(beside):
+    """As likely beforehand as alone: it takes as much more from that cause, softened, as the data then ask for."""
+    gains, catalogue = {"first": 30.0, "other": 20.0}, ["first", "other"]
+    fits = [SimpleNamespace(hypothesis=(name,), evidence=gain) for name, gain in gains.items()]
+    nominal = SimpleNamespace(evidence=0.0)
+    alone = dict(judge(nominal, fits, 10.0, catalogue, {}).probabilities)
+    found = dict(judge(nominal, fits, 10.0, catalogue, {}, beside=beside).probabilities)
+    more = found["unknown",] / found["first",] - alone["unknown",] / alone["first",]
+    assert more == pytest.approx(PRIOR_UNKNOWN * math.exp(max(beside, 0.0) / NESTED + min(beside, 0.0)))
+    assert found["other",] / found["first",] == pytest.approx(alone["other",] / alone["first",])
+    against_none = (1.0 - found["none",]) / found["none",] - (1.0 - alone["none",]) / alone["none",]
+    first = math.exp(weigh_prior(("first",), catalogue) + 30.0)
+    assert against_none == pytest.approx(first * PRIOR_UNKNOWN * math.exp(beside) / PRIOR_NONE, rel=1e-6)
+
+
 def test_causes_that_explain_nothing_take_nothing_from_none():
     """Twenty of them beside one that explains little: they share what is left beside none, however little that one explains."""
     causes = [f"cause {k}" for k in range(20)]

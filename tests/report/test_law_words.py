@@ -1,6 +1,7 @@
 """What is said of the law that an unknown cause would have to be."""
 
 import json
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -52,10 +53,9 @@ def found():
 
 def test_the_law_that_explains_most_by_itself_comes_first(found):
     assert say_missing(found) == (
-        "acts like a force on the tip of 205 ± 30 Pa of its cross-section upwards at a depth of 1 tip radius "
-        "(with parts of a force of speed)"
+        "acts like a force upwards of 205 ± 30 Pa at a depth of 1 tip radius (with parts of a force of speed)"
     )
-    assert size_of_missing(found) == ("+205 ± 30 Pa", "on the tip at a depth of 1 tip radius")
+    assert size_of_missing(found) == ("+205 ± 30 Pa", "force upwards at a depth of 1 tip radius")
 
 
 def test_a_camera_s_wobble_is_said_with_its_size_and_frequency(found):
@@ -80,15 +80,28 @@ RIM = FreeLaw(LAW_PLACES["force on the rim"], (0.0, 1.0), (0.0, 1.0), (0.0, 1.0)
 @pytest.mark.parametrize(
     "law, said",
     [
-        (a_law(LAYER, [0.0, 0.4, 0.1], 0.05), "40 ± 5 % more compressive strength at a depth of 0.3 mm"),
-        (
-            a_law(RIM, [0.041, 0.03], 0.002),
-            "a force on the tip of 0.041 ± 0.002 N/m of its circumference upwards at a depth of 0 mm",
-        ),
+        (a_law(LAYER, [0.0, 0.4, 0.1], 0.05), "40 ± 5 % more strength at a depth of 0.3 mm"),
+        (a_law(LAYER, [0.0, -0.4, 0.1], 0.05), "40 ± 5 % less strength at a depth of 0.3 mm"),
+        (a_law(RIM, [0.041, 0.03], 0.002), "a force upwards of 0.041 ± 0.002 N/m at a depth of 0 mm"),
     ],
 )
 def test_laws_in_mm_are_said_in_mm(law, said):
     assert say_law(law) == said
+
+
+@pytest.mark.parametrize(
+    "place", [place for place in LAW_PLACES.values() if place.simulated], ids=lambda place: place.name
+)
+def test_every_place_of_a_free_law_has_words(place, found):
+    free = FreeLaw(place, place.knots, place.knots, (place.knots[0], place.knots[-1]))
+    law = a_law(free, [0.0] * (len(place.knots) - 1) + [0.5 * place.scale], 0.1 * place.scale)
+    said = say_law(law)
+    assert place.shown in said and said.endswith(
+        f"of {place.knots[-1]:g}" + (f" {place.unit}" if place.unit != "1" else "")
+    )
+    found.unknown = UnknownFit(0.0, place.name, 0.4, np.zeros(1), {place.name: 5.0}, place.name, (law,))
+    size, label = size_of_missing(found)
+    assert size.startswith("+") and size.endswith(place.shown_unit) and label.startswith(place.shown)
 
 
 def test_where_the_drops_are_met_nothing_is_said_of_a_law_in_them(found):
@@ -106,25 +119,33 @@ def test_what_is_not_clear_is_not_named_beside_it(found):
 
 
 @pytest.mark.parametrize(
-    ("predicted", "evidence", "said"),
+    ("predicted", "beside", "evidence", "said"),
     [
         (
             0.004,
+            -math.inf,
             1600.0,
             "strength rate comes nearest, but does not predict drops that no fit has seen (p = 0.004).",
         ),
         (
             0.004,
+            4.9,
             1500.0,
-            "what is missing acts like a force on the tip of 205",
+            "what is missing acts like a force upwards of 205",
         ),  # the law explains more than any listed cause
-        (0.3, 1600.0, "what is missing acts like a force on the tip of 205"),
+        (0.3, -1.0, 1600.0, "what is missing acts like a force upwards of 205"),
+        (
+            0.3,
+            4.9,
+            1600.0,
+            "strength rate comes nearest, but a law left free on top of it explains more (by 4.9 in ln evidence).",
+        ),
     ],
 )
-def test_a_listed_cause_that_comes_nearest_is_said_to(found, predicted, evidence, said):
+def test_a_listed_cause_that_comes_nearest_is_said_to(found, predicted, beside, evidence, said):
     found.verdict = Verdict("unknown", [(("unknown",), 0.8), (("strength_rate",), 0.2)])
     found.posterior_nominal = SimpleNamespace(samples=lambda name: np.array([1300.0]))
-    found.predicted, found.unknown = predicted, replace(found.unknown, evidence=1526.0)
+    found.predicted, found.unknown = predicted, replace(found.unknown, evidence=1526.0, beside=beside)
     found.best = SimpleNamespace(hypothesis=("strength_rate",), evidence=evidence)
     assert say_verdict(found).startswith(
         "The simulation is wrong in a way that no listed cause explains (probability 0.80): " + said

@@ -5,24 +5,24 @@
 h_m are hats between knots, A the cross-section of the tip, a its radius: one law for all sizes. Some go with the depth in mm, as
 layers of the sample do (law_places.py). What every hat changes of drops
 and maps is simulated as for an effect of the catalogue, in which they never stand. Coefficients, alike in all data, are Gaussian
-about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/free-law.md. Mass d may not
-shrink, which such coefficients do not know: its hats serve formulas (learned_law.py) alone.
+about nought with one size, ln p_m is flat. Their integral over the linearised data is closed: docs/free-law.md.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from ...effects.law_places import LAW_PLACES
 from ...inference.emulation.grid import Request
 from ...inference.emulation.nodes import amplitude_nodes, hold_known, place_strength
 from ...inference.fits.blocks import Block, solve_globals
 from ...inference.fits.evidence import cut_gaussian
-from ...inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_p_value
+from ...inference.fits.fitting import Fit
 from ...inference.fits.steps import move_nuisances
 from ...inference.fits.tangents import linearise_at
 from ...inference.problem import Problem
@@ -31,7 +31,6 @@ from ...runs.parts import Push
 from ..screen import has_runs
 from .hats import FreeLaw, add_terms, list_laws, make_hats
 
-AHEAD = 10.0  # so much, in ln evidence, before a law that has no place in the equations
 # of the unit. A law of 3 to 24 % all along the way moves depths by 1 to 8 %; one hat is a fourth of the way
 SIZES = (0.1, 0.2, 0.4, 0.8)
 # of what a law changes of the depth: error of a response known at one amplitude. A force of 320 Pa at one tip radius changes ln D
@@ -41,15 +40,9 @@ CLEAR = 3.0  # standard deviations from which a hat larger than its step is simu
 MOST_BENT = 3  # such hats in a round
 ANYWHERE = (-1e3, 1e3)  # limits of ln p_m that are none
 ROUNDS = 2  # of Gauss and Newton about the law that is found
-EMBEDDED = {  # freedom -> the laws that are free together
-    "strength of filling factor": ("strength of filling factor",),
-    "force of depth": ("force of depth",),
-    "force of speed": ("force of speed",),
-    "strength of depth": ("strength of depth",),
-    "force of depth in mm": ("force of depth in mm",),
-    "force alike for all tips": ("force alike for all tips",),
-    "force on the rim": ("force on the rim",),
-    "strength and forces": ("strength of filling factor", "force of depth", "force of speed"),
+# freedom -> the laws that are free together: at every place that runs tell of, and at three at once
+EMBEDDED = {name: (name,) for name, place in LAW_PLACES.items() if place.simulated} | {
+    "strength and forces": ("strength of filling factor", "force of depth", "force of speed")
 }
 
 
@@ -93,33 +86,34 @@ class Tangents:
 
 @dataclass(frozen=True)
 class Marginal:
-    """One size of some laws, integrated. coefficients : ln p_m first, then hats in the order asked, in units of their scales."""
+    """One size of some laws, integrated. coefficients : ln p_m first, then what is flat, then hats in the order asked, in units
+    of their scales."""
 
     evidence: float
     coefficients: FloatArray
     covariance: FloatArray
 
 
-def needs_free_law(
-    p_value: float, rivals: Sequence[Fit], log_evidence_unknown: float, predicted: float = 1.0
-) -> bool:
-    """Whether a law in the equations can matter: the nominal model fails, and no listed cause fits, predicts held-out drops
-    (``predicted``, p value of the best) and stands far ahead of ``log_evidence_unknown``, ln evidence of the laws that cost no
-    runs."""
-    best = max(rivals, key=lambda fit: fit.evidence, default=None)
-    if p_value >= REJECTED:
-        return False
-    if best is None or best.evidence < log_evidence_unknown + AHEAD:
-        return True
-    return min(fit_p_value(best), predicted) < DOUBTFUL
+@dataclass(frozen=True)
+class Hats:
+    """What every hat by itself changes is known from runs. problem : with them among its effects; laws : with the hats that have
+    runs; index : the strength that they were made at."""
+
+    problem: Problem
+    laws: tuple[FreeLaw, ...]
+    index: int
+
+    @property
+    def names(self) -> list[str]:
+        return [hat for law in self.laws for hat in law.hats]
+
+    @property
+    def scales(self) -> dict[str, float]:
+        return {hat: law.scale for law in self.laws for hat in law.hats}
 
 
-def fit_hats(problem: Problem, fit: Fit) -> Tangents:
-    """Runs of every hat by itself, then all data about the best law that they find; a hat whose runs fail is left out.
-
-    Logarithms of depth and time are what hats change, in proportion to their coefficients, large and clear ones along
-    further runs; p_m moves along its own.
-    """
+def simulate_hats(problem: Problem, fit: Fit) -> Hats:
+    """Runs of every hat by itself, about the strength of a fit; a hat whose runs fail is left out."""
     laws = list_laws(problem, fit)
     index = round(place_strength(fit.log_p_m))  # not screening's, which may lie where soft dust costs most
     problem.require_base([index])
@@ -138,15 +132,28 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     # at every speed: what a force at some depth changes has a peak where drops end there
     nodes = [(name, hat.amplitudes[0].step, index) for name, hat in hats.items()]
     free.require_changes(nodes, "free law", rough=True)
-    names = [name for name in hats if has_runs(problem, name)]
-    scales = {hat: law.scale for law in laws for hat in law.hats}
+    kept = tuple(
+        replace(
+            law,
+            knots=tuple(knot for knot, hat in zip(law.knots, law.hats, strict=True) if has_runs(free, hat)),
+        )
+        for law in laws
+    )
+    return Hats(free, kept, index)
+
+
+def fit_hats(problem: Problem, fit: Fit, simulated: Hats) -> Tangents:
+    """All data about the best law that the hats find.
+
+    Logarithms of depth and time are what hats change, in proportion to their coefficients, large and clear ones along
+    further runs; p_m moves along its own.
+    """
+    free, kept, index = simulated.problem, simulated.laws, simulated.index
+    names, scales = simulated.names, simulated.scales
+    hats = {name: free.effects[name] for name in names}
     free, formulas, units = add_terms(free)
     scales |= units
     names += formulas
-    kept = tuple(
-        replace(law, knots=tuple(knot for knot, hat in zip(law.knots, law.hats, strict=True) if hat in names))
-        for law in laws
-    )
     low, high = (math.log(p) for p in problem.campaign.p_m_range)
     nuisances, log_p_m = fit.nuisances, fit.log_p_m
     values = dict.fromkeys(names, 0.0)
@@ -185,6 +192,32 @@ def fit_hats(problem: Problem, fit: Fit) -> Tangents:
     return found
 
 
+def weigh_beside(simulated: Hats, fit: Fit) -> float:
+    """ln Bayes factor of a law that is left free on top of a listed cause, or of a pair, over these by themselves: the mean over
+    all freedoms and sizes. What the hats change is taken as without the cause; its amplitude is flat in both, as ln p_m is."""
+    free, causes = simulated.problem, list(fit.hypothesis)
+    free.require_base_about(fit.log_p_m)
+    values = {**fit.values, **dict.fromkeys(simulated.names, 0.0)}
+    blocks = linearise_at(free, fit.nuisances, fit.log_p_m, values)
+    names, scales = [*causes, *simulated.names], simulated.scales | dict.fromkeys(causes, 1.0)
+    gram, log_determinant, points = gather(blocks, names, scales)
+    found = Tangents(
+        simulated.laws,
+        ("ln_p_m", *names),
+        gram,
+        log_determinant,
+        points,
+        np.zeros((0, len(names))),
+        fit.log_p_m,
+    )
+    low, high = (math.log(p) for p in free.campaign.p_m_range)
+    free_to_be = [hats for hats in (choose_hats(found, freedom) for freedom in EMBEDDED) if hats]
+    terms = [
+        integrate(found, hats, size, (low, high), causes).evidence for hats in free_to_be for size in SIZES
+    ]
+    return log_mean(terms) - integrate(found, [], 1.0, (low, high), causes).evidence if terms else 0.0
+
+
 def choose_hats(found: Tangents, freedom: str) -> list[str]:
     """Hats of the laws that are free together."""
     return [hat for law in found.laws if law.name in EMBEDDED[freedom] for hat in law.hats]
@@ -214,21 +247,27 @@ def gather(
 
 
 def integrate(
-    found: Tangents, hats: Sequence[str], size: float, limits: tuple[float, float] = ANYWHERE
+    found: Tangents,
+    hats: Sequence[str],
+    size: float,
+    limits: tuple[float, float] = ANYWHERE,
+    flat: Sequence[str] = (),
 ) -> Marginal:
-    """Evidence and posterior with Gaussian coefficients of this size and ln p_m flat between limits.
+    """Evidence and posterior with Gaussian coefficients of this size and ln p_m flat between limits, others flat everywhere.
 
     Evidence without the limits is that of the covariance C + size² T Tᵀ over all data at once, by the matrix inversion lemma.
     """
-    own = [found.names.index("ln_p_m"), *(found.names.index(name) for name in hats)]
-    places = np.array(own) + 1
-    information = found.gram[np.ix_(places, places)] + np.diag([0.0] + [size**-2] * len(hats))
+    own = ["ln_p_m", *flat, *hats]
+    places = np.array([found.names.index(name) for name in own]) + 1
+    prior = [0.0] * (1 + len(flat)) + [size**-2] * len(hats)
+    information = found.gram[np.ix_(places, places)] + np.diag(prior)
     factor = cho_factor(information, lower=True)
     towards = found.gram[places, 0]
     best, covariance = cho_solve(factor, towards), cho_solve(factor, np.eye(len(own)))
     chi_square = found.gram[0, 0] - towards @ best
     log_information = 2 * float(np.sum(np.log(np.diag(factor[0]))))
-    evidence = -0.5 * (chi_square + found.log_determinant + (found.points - 1) * math.log(2 * math.pi))
+    evidence = -0.5 * (chi_square + found.log_determinant)
+    evidence -= 0.5 * (found.points - 1 - len(flat)) * math.log(2 * math.pi)
     evidence -= 0.5 * log_information + len(hats) * math.log(size) + math.log(limits[1] - limits[0])
     low, high = (limit - found.log_p_m for limit in limits)
     sigma = math.sqrt(covariance[0, 0])
@@ -238,6 +277,12 @@ def integrate(
     along = covariance[0] / sigma
     best = best + along * mean
     return Marginal(float(evidence), best, covariance + np.outer(along, along) * (variance - 1.0))
+
+
+def log_mean(values: Collection[float]) -> float:
+    """ln of the mean of what these are the logarithms of."""
+    top = max(values)
+    return top + math.log(sum(math.exp(value - top) for value in values) / len(values))
 
 
 def average(laws: Sequence[FreeLaw], each: Sequence[Marginal]) -> tuple[tuple[RecoveredLaw, ...], FloatArray]:

@@ -22,7 +22,7 @@ from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis,
 from ...inference.fits.refine import list_large_effects, refine
 from ...inference.problem import Problem
 from ...records import FloatArray
-from ..explore import FACTORS, NOWHERE, fit_from_strengths
+from ..explore import FACTORS, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
 from .free_law import EMBEDDED, SIZES, Marginal, Tangents, integrate
@@ -48,6 +48,9 @@ MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in 
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
 MOST_ANEW, SHARES = 2, (1.0, 4.0)
+# of what the best gains: what a place's best term has to gain by few runs, or be behind by no more than these are good to, for
+# it to be begun anew and for the other forms to be tried
+WORTH = 0.5
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
 
@@ -181,7 +184,7 @@ def fit_formulas(
             if _explains(fits):
                 return sorted(fits, key=lambda fit: -fit.evidence)
             best = max(fits, key=lambda fit: fit.evidence, default=nominal)
-        near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - NOWHERE}
+        near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - _allow(best, nominal)}
         near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
         fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
@@ -307,7 +310,10 @@ def fit_siblings(
         if not _explains(found):
             found = _refine_leading(problem, found, 1, refined)
         explained = _explains(found)
-        begun = _list_places(found, () if explained else sparse, units, ALIKE if explained else NOWHERE)
+        behind = (
+            ALIKE if explained else _allow(max(found, key=lambda fit: fit.evidence, default=nominal), nominal)
+        )
+        begun = _list_places(found, () if explained else sparse, units, behind)
         if explained:
             further = _list_places(sparse, (), units, math.inf)
             begun |= {
@@ -334,6 +340,11 @@ def fit_siblings(
                     again = fit_from_strengths(problem, nominal, (name,), top)
                     siblings += [again] if again is not None else []
         found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
+
+
+def _allow(best: Fit, nominal: Fit) -> float:
+    """How far behind the best in ln evidence a place is still looked at where nothing explains the data."""
+    return max(ROUGH, (1.0 - WORTH) * (best.evidence - nominal.evidence))
 
 
 def _rank_place(problem: Problem, place: str) -> int:

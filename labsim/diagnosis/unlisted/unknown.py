@@ -10,7 +10,6 @@ too, and formulas that cost no runs, together as one freedom; where it fails, la
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +20,7 @@ from ...inference.fits.evidence import log_share_inside
 from ...inference.fits.fitting import DOUBTFUL, Fit, fit_p_value
 from ...inference.problem import Problem
 from ...records import FloatArray
-from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate
+from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate, log_mean
 from .free_law import SIZES as LAW_SIZES
 from .hats import fit_without_runs
 from .wobble import Wobble, fit_wobble
@@ -56,7 +55,8 @@ class UnknownFit:
 
     evidences : of every freedom, over its sizes; laws : what the data say of the laws of the best freedom that stands in the
     equations, ``embedded``; empty where none was tried. tangents : of all hats, where embedded laws were tried. wobble : of the
-    camera, where the nominal model may fail.
+    camera, where the nominal model may fail. beside : ln Bayes factor of a free law on top of the best listed cause over that
+    cause alone; minus infinity where that was not asked.
     """
 
     evidence: float
@@ -68,6 +68,7 @@ class UnknownFit:
     laws: tuple[RecoveredLaw, ...] = ()
     tangents: Tangents | None = None
     wobble: Wobble | None = None
+    beside: float = -math.inf
 
     def find_wobble(self, nominal: Fit) -> Wobble | None:
         """The camera's wobble, where that alone explains the data."""
@@ -141,12 +142,6 @@ def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) ->
     nearest = max(embedded, key=lambda name: evidences[name], default="")
     laws = embedded.get(nearest, ())
     return UnknownFit(log_mean(evidences.values()), *best[1:], evidences, nearest, laws, tangents, wobble)
-
-
-def log_mean(values: Collection[float]) -> float:
-    """ln of the mean of what these are the logarithms of."""
-    top = max(values)
-    return top + math.log(sum(math.exp(value - top) for value in values) / len(values))
 
 
 def inflate(block: Block, free: FloatArray | None, size: float) -> Block:

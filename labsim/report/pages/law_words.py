@@ -17,7 +17,7 @@ from ...diagnosis.unlisted.wobble import Wobble
 from ...effects import Effect
 from ...effects.law_places import FORCE, MASS, SHEAR, SIGMA, WHERE
 from .page import show_number
-from .phrases import shown_unit
+from .phrases import say_hypothesis, shown_unit, state_p_value
 
 MISSING = {
     "depth and speed": "a law of depth and speed, about {size} % of the depth",
@@ -26,8 +26,6 @@ MISSING = {
     "depth and speed and undisturbed dust": "a layering of the dust that was there before the drop, and a law of depth and "
     "speed, about {size} % of the depth",
 }
-# after the unit of a force: what it goes with
-PER = {"Pa": " of its cross-section", "N/m": " of its circumference", "mN": ", alike for all tips,"}
 POINTS = 41  # of a curve in diagnosis.json
 CLEAR = 2.0  # standard deviations from which a further law of several is named
 
@@ -62,8 +60,19 @@ def say_missing(found: Diagnosis) -> str:
 
 
 def comes_nearest(found: Diagnosis) -> bool:
-    """Whether a listed cause explains more than any law without a name, and is set back because held-out drops are missed."""
-    return found.predicted < PREDICTED and found.best.evidence > found.unknown.evidence
+    """Whether a listed cause explains more than any law without a name, or that was learned, and is set back because held-out
+    drops are missed, or a law on top of it explains more."""
+    learned = found.learned.best.fit.evidence if found.learned is not None else -math.inf
+    set_back = found.predicted < PREDICTED or found.unknown.beside > 0.0
+    return set_back and found.best.evidence > max(found.unknown.evidence, learned)
+
+
+def say_nearest(found: Diagnosis) -> str:
+    """That cause, and what sets it back."""
+    lacks = f"does not predict drops that no fit has seen ({state_p_value(found.predicted)})"
+    if found.predicted >= PREDICTED:
+        lacks = f"a law left free on top of it explains more (by {found.unknown.beside:.1f} in ln evidence)"
+    return f"{say_hypothesis(found.best.hypothesis)} comes nearest, but {lacks}"
 
 
 def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
@@ -71,10 +80,7 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
     if is_embedded(found):
         law = _rank(found)[0]
         _, value, sigma = clearest(law)
-        return (
-            _say_size(law, value, sigma, "+"),
-            f"{'of the strength' if _is_strength(law) else 'on the tip'} {_say_place(law)}",
-        )
+        return _say_size(law, value, sigma, "+"), f"{law.law.place.shown} {_say_place(law)}"
     wobble = found.unknown.find_wobble(found.nominal)
     if wobble is not None:
         return _say_swing(wobble), f"of the camera, at {wobble.frequency:.0f} Hz"
@@ -84,14 +90,15 @@ def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
 
 
 def say_law(law: RecoveredLaw) -> str:
-    """Its clearest knot: a strength 12 ± 3 % higher than p_m gives at a filling factor of 0.18."""
+    """Its clearest knot: 12 ± 3 % more strength at a filling factor of 0.18, a force upwards of 205 ± 30 Pa at a depth of 1 tip
+    radius."""
     _, value, sigma = clearest(law)
-    size = _say_size(law, abs(value), sigma)
-    if _is_strength(law):
-        return f"{size} {'more' if value > 0 else 'less'} compressive strength {_say_place(law)}"
-    towards = {"depth": ("upwards", "downwards"), "speed": ("against the motion", "along the motion")}
-    word = towards[law.law.over][value < 0]
-    return f"a force on the tip of {size}{PER[law.law.place.value_unit]} {word} {_say_place(law)}"
+    shown, where = law.law.place.shown, _say_place(law)
+    if law.law.place.shown_unit != "%":
+        return f"a {shown} of {_say_size(law, value, sigma)} {where}"
+    if value < 0 and shown.startswith("more "):
+        value, shown = -value, f"less {shown.removeprefix('more ')}"
+    return f"{_say_size(law, value, sigma)} {shown} {where}"
 
 
 def _say_size(law: RecoveredLaw, value: float, sigma: float, sign: str = "") -> str:
@@ -102,10 +109,6 @@ def _say_size(law: RecoveredLaw, value: float, sigma: float, sign: str = "") -> 
     return f"{size} ± {place.factor * sigma:.{digits}f} {place.shown_unit}"
 
 
-def _is_strength(law: RecoveredLaw) -> bool:
-    return law.law.place.shown_unit == "%"
-
-
 def _count_digits(sigma: float) -> int:
     """Decimals that show a standard deviation with one digit at least."""
     return max(0, -math.floor(math.log10(sigma))) if sigma > 0 else 0
@@ -113,11 +116,10 @@ def _count_digits(sigma: float) -> int:
 
 def _say_place(law: RecoveredLaw) -> str:
     knot, unit = clearest(law)[0], law.law.place.unit
-    if law.law.over == "filling factor":
-        return f"at a filling factor of {knot:g}"
     if unit == "tip radii" and knot == 1:
         unit = "tip radius"
-    return f"at {knot:g} m/s" if law.law.over == "speed" else f"at a depth of {knot:g} {unit}"
+    over = law.law.over.removesuffix(" where dust lay")
+    return f"at a {over} of {knot:g}" + (f" {unit}" if unit != "1" else "")
 
 
 def clearest(law: RecoveredLaw) -> tuple[float, float, float]:
@@ -149,6 +151,7 @@ def describe_unknown(found: Diagnosis) -> dict[str, Any]:
         "best": unknown.block,
         "log_bayes": {name: value - found.nominal.evidence for name, value in unknown.evidences.items()},
         "embedded": unknown.embedded,
+        "log_bayes_beside_best_cause": unknown.beside if math.isfinite(unknown.beside) else None,
         "laws": [
             {
                 "name": each.law.name,
@@ -360,8 +363,8 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
         return None
     ahead = unknown.evidences[unknown.block] - unknown.evidences[unknown.embedded]
     words = (
-        "A law that is left free where the equations have a place for it: a factor on the compressive strength at some filling "
-        "factors, a force on the tip, per its cross-section, at some depths or speeds, linear between. "
+        "A law that is left free where the equations have a place for it: a factor on a strength, a force on the tip, per its "
+        "cross-section, a mass that moves with it; known at some depths, speeds, strains or times, linear between. "
         f"Of these the data prefer {unknown.embedded}."
     )
     if not is_embedded(found) and ahead > 0:
