@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from .interactive import MARGIN, Spec
 from .style import BLUE, INK, ORANGE, new_figure
 
 POINTS = 121
+WIDEST = 30  # characters of a line beside the height of a figure
 
 
 def trace_law(law: RecoveredLaw) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -56,7 +58,7 @@ def draw_laws(laws: Sequence[RecoveredLaw], path: Path, formula: Formula | None 
                 ax.legend(frameon=False)
             along, up = law.law.place.axes
             ax.set_xlabel(along)
-            ax.set_ylabel(up)
+            ax.set_ylabel("\n".join(wrap(up, WIDEST)))
     return path
 
 
@@ -99,6 +101,6 @@ def plot_law(law: RecoveredLaw, formula: Formula | None = None) -> Spec:
         "showlegend": False,
         "hovermode": "x unified",
         "xaxis": {"title": {"text": along}, "zeroline": False, "hoverformat": ".3g"},
-        "yaxis": {"title": {"text": up}, "zeroline": True},
+        "yaxis": {"title": {"text": "<br>".join(wrap(up, WIDEST))}, "zeroline": True},
     }
     return {"data": data, "layout": layout}
