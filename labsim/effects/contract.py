@@ -292,11 +292,6 @@ class Effect:
             full[name] = float(value)
         return full
 
-    def is_null(self, values: Values) -> bool:
-        """Whether the effect is off at these values; one without parameters never is."""
-        full = self.at(values)
-        return bool(self.amplitudes) and all(full[each.name] == each.null for each in self.amplitudes)
-
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """All parameters from their priors."""
         return {parameter.name: parameter.draw(rng) for parameter in self.parameters}

@@ -95,15 +95,21 @@ def write_log(path, text=None, encoding="utf-8", **changes):
 
 def test_six_logs(tmp_path):
     new = read_log(write_log(tmp_path / "a.log"))
-    assert new.voxel == pytest.approx(40e-6) and new.attenuation_range == (0.0, 0.18)
+    assert (
+        new.voxel == pytest.approx(40e-6)
+        and new.number("maximum for CS to image conversion", "reconstruction") == 0.18
+    )
     assert new.text("filename prefix", "acquisition") == "dust"
     assert new.text("Filename Prefix", "reconstruction") == "dust_rec"
     typo = read_log(write_log(tmp_path / "b.log", minimum="Mininum", low="-0.482", hu="ON (65535)"))
-    assert typo.attenuation_range == (-0.482, 0.18) and typo.switch("hu calibration") is True
+    assert (
+        typo.number("minimum for CS to image conversion", "reconstruction") == -0.482
+        and typo.switch("hu calibration") is True
+    )
     old = read_log(
         write_log(tmp_path / "c.log", "[Acquisition]\r\nIMAGE PIXEL SIZE (UM)= 37,5\r\nNote=a=b\r\n")
     )
-    assert old.voxel == pytest.approx(37.5e-6) and old.text("note") == "a=b" and old.attenuation_range is None
+    assert old.voxel == pytest.approx(37.5e-6) and old.text("note") == "a=b"
     latin = read_log(
         write_log(tmp_path / "d.log", LOG.format(**FACTS) + "Operator=Gürtler µ\n", encoding="latin-1")
     )

@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 
+import dynesty
 import laws
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from labsim.diagnosis.campaign import diagnose_campaign
 from labsim.effects.model import Model
 from labsim.errors import EffectError
 from labsim.inference.calibrate import calibrate
-from labsim.inference.fits.target import integrate_evidence
+from labsim.inference.fits.target import make_target
 from labsim.report.outputs import write_result
 
 
@@ -65,6 +66,33 @@ def test_a_model_that_cannot_be_at_work_here_is_refused(place):
     model = Model(1300.0, (("ct_scale", {"factor": 1.05}),))
     with pytest.raises(EffectError, match="does not apply here"):
         calibrate(campaign, store=laws.LawStore(place / "store"), model=model)
+
+
+def integrate_evidence(problem, fit):
+    """ln of the integrated likelihood by nested sampling (Speagle 2020, MNRAS 493, 3132), and its error."""
+    target = make_target(problem, fit)
+    low, high = target.bounds[0]
+    cut = [tuple(float(p.prior.cdf(limit)) for limit in p.limits) for p in target.parameters]
+
+    def place_point(cube):
+        point = [low + (high - low) * cube[0]]
+        for u, parameter, (below, above) in zip(cube[1:], target.parameters, cut, strict=True):
+            point.append(float(parameter.prior.ppf(below + (above - below) * u)) - parameter.null)
+        return np.array(point)
+
+    sampler = dynesty.NestedSampler(
+        lambda theta: -float(target.misfit(theta)[0]),
+        place_point,
+        len(target.names),
+        nlive=400,
+        rstate=np.random.default_rng(1),
+    )
+    sampler.run_nested(dlogz=0.05, print_progress=False)
+    points = sum(block.residual.size for block in fit.blocks)
+    determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.blocks)
+    constant = -0.5 * (determinant + points * math.log(2 * math.pi))
+    price = sum(problem.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
+    return float(sampler.results.logz[-1]) + constant + price, float(sampler.results.logzerr[-1])
 
 
 @pytest.mark.parametrize("effect", ["pixel_scale", "strength_rate"])

@@ -72,13 +72,6 @@ class SkyScanLog:
         step = self.number("section to section step", "reconstruction")
         return None if self.voxel is None else self.voxel * (step or 1.0)
 
-    @property
-    def attenuation_range(self) -> tuple[float, float] | None:
-        """Attenuation of grey 0 and of the top level (arbitrary unit, may be negative at 0)."""
-        low = self.number("minimum for cs to image conversion", "reconstruction")
-        high = self.number("maximum for cs to image conversion", "reconstruction")
-        return None if low is None or high is None else (low, high)
-
 
 def find_log(folder: Path) -> Path | None:
     """The ``_rec.log`` of a folder of slices, or the only log there."""

@@ -1,4 +1,4 @@
-"""The posterior about a fit as a function that is quick to evaluate, and its integral by nested sampling."""
+"""The posterior about a fit as a function that is quick to evaluate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from ...calibrated import name_column
 from ...effects import Parameter
-from ...errors import InferenceError
 from ...records import FloatArray
 from ..observations.acceleration_model import AccelerationModel
 from ..problem import Problem
@@ -86,37 +85,3 @@ def make_target(problem: Problem, fit: Fit) -> Target:
     else:
         misfit = measure_residual(miss, centre, fit.covariance)
     return Target(names, nulls, parameters, misfit, np.array(bounds))
-
-
-def integrate_evidence(problem: Problem, fit: Fit, *, seed: int = 1) -> tuple[float, float]:
-    """ln of the integrated likelihood by nested sampling, and its error: what Laplace's formula in Fit.evidence is checked by.
-
-    Needs dynesty (the extra ``evidence``); Speagle (2020), MNRAS 493, 3132.
-    """
-    try:
-        import dynesty
-    except ImportError:
-        raise InferenceError("", "dynesty", 'is not installed; pip install "labsim[evidence]"') from None
-    target = make_target(problem, fit)
-    low, high = target.bounds[0]
-    cut = [tuple(float(p.prior.cdf(limit)) for limit in p.limits) for p in target.parameters]
-
-    def place(cube: FloatArray) -> FloatArray:
-        point = [low + (high - low) * cube[0]]
-        for u, parameter, (below, above) in zip(cube[1:], target.parameters, cut, strict=True):
-            point.append(float(parameter.prior.ppf(below + (above - below) * u)) - parameter.null)
-        return np.array(point)
-
-    sampler = dynesty.NestedSampler(
-        lambda theta: -float(target.misfit(theta)[0]),
-        place,
-        len(target.names),
-        nlive=400,
-        rstate=np.random.default_rng(seed),
-    )
-    sampler.run_nested(dlogz=0.05, print_progress=False)
-    points = sum(block.residual.size for block in fit.blocks)
-    determinant = sum(float(np.linalg.slogdet(block.covariance)[1]) for block in fit.blocks)
-    constant = -0.5 * (determinant + points * math.log(2 * math.pi))
-    price = sum(problem.shape_evidence.get(name, 0.0) for name in fit.hypothesis)
-    return float(sampler.results.logz[-1]) + constant + price, float(sampler.results.logzerr[-1])
