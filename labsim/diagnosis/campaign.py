@@ -283,17 +283,6 @@ def diagnose_campaign(
             f"of the listed causes {' with '.join(found.leading.hypothesis)} explains most, but it does not {lacks} "
             f"(p = {found.predicted:.2g}): something that is not listed may be at work"
         )
-    wobble = found.unknown.find_wobble(nominal)
-    if found.verdict.word == "unknown" and wobble is not None:
-        warnings.append(
-            f"p_m is {math.exp(wobble.log_p_m):.4g} Pa, to {100 * wobble.log_p_m_sigma:.1f} %, with the camera's wobble taken "
-            "out; all other figures of p_m are without"
-        )
-    elif found.verdict.word == "unknown":
-        warnings.append(
-            f"p_m is not measured while the cause is unknown: {np.median(posterior.calibrated):.4g} Pa without, "
-            f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"
-        )
     sampled = {fit.hypothesis: chain.calibrated for fit, chain in ((nominal, posterior), (best, extended))}
     rivals = [allow_for_codes(problem, nominal, fit) for fit in found.rivals]
     averaged = average_p_m(
@@ -314,6 +303,21 @@ def diagnose_campaign(
     if found.verdict.word == "unknown":
         listed = [fit for fit in found.rivals if set(fit.hypothesis) <= set(found.leading.hypothesis)]
         learned = learn_law(problem, nominal, found.unknown, held_nominal, listed)
+    wobble = found.unknown.find_wobble(nominal)
+    if found.verdict.word == "unknown" and wobble is not None:
+        warnings.append(
+            f"p_m is {math.exp(wobble.log_p_m):.4g} Pa, to {100 * wobble.log_p_m_sigma:.1f} %, with the camera's wobble taken "
+            "out; all other figures of p_m are without"
+        )
+    elif found.verdict.word == "unknown":
+        measured = "p_m is not measured while the cause is unknown"
+        if learned is not None:
+            log_p_m, sigma = learned.best.fit.log_p_m, math.sqrt(learned.best.fit.covariance[0, 0])
+            measured = f"p_m is {math.exp(log_p_m):.4g} Pa, to {100 * sigma:.1f} %, with the formula that was learned"
+        warnings.append(
+            f"{measured}: {np.median(posterior.calibrated):.4g} Pa without, "
+            f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"
+        )
     doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
     if best is nominal:  # one that fails has no best worth to be at
         doubts += [f"nominal model: {text}" for text in warn_unsettled(nominal)]

@@ -207,6 +207,17 @@ def test_the_equation_has_the_formula_where_it_acts(coefficients, said):
     assert say_equation(a_formula(**coefficients)) == said
 
 
+def test_the_tile_has_the_formula_where_one_was_learned(found):
+    found.learned = SimpleNamespace(best=a_formula(shaft_drag=(820.0, 40.0), surface_crust=(0.046, 0.002)))
+    assert size_of_missing(found) == ("(820 ± 40) Pa s²/m² × z/a", "drag of depth, beside surface crust")
+    found.learned = SimpleNamespace(best=a_formula(rolling_shutter=(5.0, 0.1), viscous_drag=(264.0, 28.0)))
+    value, places = size_of_missing(found)
+    assert (
+        value == "(5.00 ± 0.10) µs × rows + (264 ± 28) Pa s/m × v"
+        and places == "clock of row and force of speed"
+    )
+
+
 def test_every_place_of_the_drop_stands_in_the_equation():
     for place in LAW_PLACES.values():
         assert bool(place.enters) is (place.add is not None), place.name

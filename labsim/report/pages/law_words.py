@@ -76,7 +76,13 @@ def say_nearest(found: Diagnosis) -> str:
 
 
 def size_of_missing(found: Diagnosis) -> tuple[str, str] | None:
-    """Value and unit for a tile: the clearest knot of an embedded law, the swing of a camera, or the share of the depth."""
+    """Value and words for a tile: the formula and its places, the clearest knot of an embedded law, the swing of a camera, or the
+    share of the depth."""
+    if found.learned is not None:
+        best = found.learned.best
+        places = " and ".join(dict.fromkeys(term.place for term in best.terms))
+        beside = "".join(f", beside {effect.name.replace('_', ' ')}" for effect in best.causes)
+        return " + ".join(_say_terms(best)), places + beside
     if is_embedded(found):
         law = _rank(found)[0]
         _, value, sigma = clearest(law)
@@ -387,7 +393,7 @@ def describe_laws(found: Diagnosis) -> dict[str, Any] | None:
                 + (" Dashed: the formula, with its band." if law.law.name in drawn else ""),
             }
         )
-    learned = [*say_learned(found), "labsim simulate --model model.toml simulates a drop with it"]
+    learned = [*say_learned(found), "a drop with it: labsim simulate --model model.toml"]
     return {
         "words": words,
         "rows": rows,
