@@ -19,7 +19,7 @@ from ..inference.calibrate import (
     warn_unsettled,
     warn_unused_scans,
 )
-from ..inference.fits.fitting import REJECTED, Fit, fit_hypothesis, fit_p_value
+from ..inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, fit_p_value
 from ..inference.fits.posterior import Posterior
 from ..inference.fits.refine import list_large_effects, refine
 from ..inference.free_fall import doubt_scales
@@ -155,6 +155,8 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
         predicted = check_leading(problem, leading, np.random.default_rng(seed))
     # the laws without a name are those of drops
     explained = problem.pushed or unknown.find_wobble(nominal) is not None
+    # two codes differ more in the force that accelerometers feel than such a law may say
+    explained |= problem.felt and bool(rivals) and min(fit_p_value(leading), predicted) >= DOUBTFUL
     if not explained and p_value < REJECTED:
         hats = simulate_hats(problem, nominal)
         unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal, hats))
