@@ -46,12 +46,16 @@ def test_the_hidden_cause_is_named(name, drops, shared_store):
     assert low < truth["pm"] < high
     if truth["cause"] == "none":
         assert found.p_value > 0.05
+        assert found.unknown.tangents is None and found.unknown.beside == -math.inf  # no runs for a free law
     else:
         assert found.p_value < 0.01
         assert found.gain.log_score_difference > 4
         # a wrong scale is on the held-out drop's own free fall too
         if not drops and found.gain.rms_nominal > found.gain.rms_noise:
             assert found.gain.fraction_removed > 0.8
+        if not found.problem.felt and not found.problem.pushed:
+            # a law left free competes though the cause explains all, and finds nothing on top of it
+            assert found.unknown.tangents is not None and -10.0 < found.unknown.beside < 2.0
 
 
 def fake_fit(hypothesis, evidence):
