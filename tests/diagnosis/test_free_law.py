@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -99,6 +100,28 @@ def test_a_law_on_top_of_a_cause_is_weighed_in_what_that_cannot_explain() -> Non
     gained -= 0.5 * np.linalg.slogdet(covariance)[1]
     assert with_it.evidence - without.evidence == pytest.approx(gained, rel=1e-9)
     assert len(with_it.coefficients) == 4 and len(without.coefficients) == 2
+
+
+def test_all_laws_are_weighed_on_top_of_a_cause_that_the_data_speak_of(monkeypatch) -> None:
+    law = LAWS[0]
+    names = ["ln_p_m", "cause", *law.hats]
+    block = a_block(np.random.default_rng(3), 40, names)
+    blocks = [block]
+    monkeypatch.setattr(free_law, "linearise_at", lambda *place: blocks)
+    problem = SimpleNamespace(
+        campaign=SimpleNamespace(p_m_range=(500.0, 3000.0)), require_base_about=lambda log_p_m: None
+    )
+    fit = SimpleNamespace(hypothesis=("cause",), values={"cause": 0.1}, log_p_m=7.0, nuisances=())
+    simulated = free_law.Hats(problem, (law,), 0)
+    gram, *rest = gather(blocks, names[1:], simulated.scales | {"cause": 1.0})
+    found = Tangents((law,), tuple(names), gram, *rest, np.zeros((0, 1)), 7.0)
+    limits = (math.log(500.0), math.log(3000.0))
+    each = [integrate(found, law.hats, size, limits, ["cause"]).evidence for size in free_law.SIZES]
+    alone = integrate(found, [], 1.0, limits, ["cause"]).evidence
+    mean = math.log(np.mean(np.exp(np.array(each) - alone)))
+    assert free_law.weigh_beside(simulated, fit) == pytest.approx(mean, abs=1e-9)
+    blocks = [replace(block, tangents={**block.tangents, "cause": np.zeros(40)})]
+    assert free_law.weigh_beside(simulated, fit) == -math.inf
 
 
 @pytest.mark.parametrize("limits", [(6.8, 7.1), (8.0, 9.0)])

@@ -194,7 +194,8 @@ def fit_hats(problem: Problem, fit: Fit, simulated: Hats) -> Tangents:
 
 def weigh_beside(simulated: Hats, fit: Fit) -> float:
     """ln Bayes factor of a law that is left free on top of a listed cause, or of a pair, over these by themselves: the mean over
-    all freedoms and sizes. What the hats change is taken as without the cause; its amplitude is flat in both, as ln p_m is."""
+    all freedoms and sizes; minus infinity where nothing can be said. What the hats change is taken as without the cause; its
+    amplitude is flat in both, as ln p_m is."""
     free, causes = simulated.problem, list(fit.hypothesis)
     free.require_base_about(fit.log_p_m)
     values = {**fit.values, **dict.fromkeys(simulated.names, 0.0)}
@@ -211,11 +212,13 @@ def weigh_beside(simulated: Hats, fit: Fit) -> float:
         fit.log_p_m,
     )
     low, high = (math.log(p) for p in free.campaign.p_m_range)
-    free_to_be = [hats for hats in (choose_hats(found, freedom) for freedom in EMBEDDED) if hats]
-    terms = [
-        integrate(found, hats, size, (low, high), causes).evidence for hats in free_to_be for size in SIZES
-    ]
-    return log_mean(terms) - integrate(found, [], 1.0, (low, high), causes).evidence if terms else 0.0
+    freedoms = [hats for hats in (choose_hats(found, freedom) for freedom in EMBEDDED) if hats]
+    try:
+        alone = integrate(found, [], 1.0, (low, high), causes).evidence
+        terms = [integrate(found, hats, size, (low, high), causes) for hats in freedoms for size in SIZES]
+    except np.linalg.LinAlgError:  # the data say nothing of the cause where its fit ended
+        return -math.inf
+    return log_mean([each.evidence for each in terms]) - alone if terms else -math.inf
 
 
 def choose_hats(found: Tangents, freedom: str) -> list[str]:
