@@ -113,7 +113,7 @@ def describe_law(found: Diagnosis) -> list[dict]:
                 for term, value, sigma in zip(each.terms, each.coefficients, each.sigma, strict=True)
             },
             "evidence": each.fit.evidence - found.nominal.evidence,
-            "ln_p_m": [each.fit.log_p_m, float(np.sqrt(each.fit.covariance[0, 0]))],
+            "ln_p_m": list(each.log_p_m),
             "rms": [each.gain.rms_nominal, each.gain.rms_extended],
         }
         for each in found.learned.formulas

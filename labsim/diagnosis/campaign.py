@@ -19,7 +19,7 @@ from ..inference.calibrate import (
     warn_unsettled,
     warn_unused_scans,
 )
-from ..inference.fits.fitting import DOUBTFUL, REJECTED, Fit, fit_hypothesis, fit_p_value
+from ..inference.fits.fitting import DOUBTFUL, REJECTED, Fit, find_leading, fit_hypothesis, fit_p_value
 from ..inference.fits.posterior import Posterior
 from ..inference.fits.refine import list_large_effects, refine
 from ..inference.free_fall import doubt_scales
@@ -45,14 +45,13 @@ from .judge import NESTED, PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge,
 from .misfit import Part, measure_misfit
 from .next_experiment import Suggestion, suggest, suggest_between_formulas
 from .pairs import confirm_pairs, refine_leading, return_to_singles
-from .screen import CLOSE, Score, Screening, draw_strengths, has_runs, list_confusable, screen
+from .screen import CLOSE, HALF, Score, Screening, draw_strengths, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
 from .unlisted.free_law import fit_hats, simulate_hats, weigh_beside
 from .unlisted.learned_law import LearnedLaw, learn_law
 from .unlisted.unknown import UnknownFit, fit_unknown
 from .untestable import Combination, Untestable, find_combination, list_untestable
 
-HALF = 0.5  # of the best gain, if that is less than CLOSE asks: large effects are not what screening or fingerprints say
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
 ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
@@ -312,12 +311,12 @@ def diagnose_campaign(
             "out; all other figures of p_m are without"
         )
     elif found.verdict.word == "unknown":
-        measured = "p_m is not measured while the cause is unknown"
+        measured = "p_m is not measured while the cause is unknown:"
         if learned is not None:
-            log_p_m, sigma = learned.best.fit.log_p_m, math.sqrt(learned.best.fit.covariance[0, 0])
-            measured = f"p_m is {math.exp(log_p_m):.4g} Pa, to {100 * sigma:.1f} %, with the formula that was learned"
+            log_p_m, sigma = learned.best.log_p_m
+            measured = f"p_m is {math.exp(log_p_m):.4g} Pa, to {100 * sigma:.1f} %, with the formula that was learned;"
         warnings.append(
-            f"{measured}: {np.median(posterior.calibrated):.4g} Pa without, "
+            f"{measured} {np.median(posterior.calibrated):.4g} Pa without, "
             f"{np.median(extended.calibrated):.4g} Pa with the nearest listed cause; neither's interval holds"
         )
     doubts = [f"nominal model: {text}" for text in warn_of_range(problem, nominal)]
@@ -398,11 +397,6 @@ def check_leading(problem: Problem, leading: Fit, rng: np.random.Generator) -> f
 def fails(fit: Fit) -> bool:
     """Whether a hypothesis does not explain the data that it was fitted to."""
     return fit_p_value(fit) < REJECTED
-
-
-def find_leading(rivals: Sequence[Fit], nominal: Fit) -> Fit:
-    """The rival with most evidence; the nominal fit where there is none."""
-    return max(rivals, key=lambda fit: fit.evidence, default=nominal)
 
 
 def _predict(problem: Problem, fit: Fit, seed: int, progress: Progress | None) -> tuple[HeldOut, Posterior]:

@@ -20,6 +20,7 @@ from ..inference.fits.fitting import (
     REJECTED,
     Fit,
     Hypothesis,
+    find_leading,
     fit_hypothesis,
     fit_p_value,
     with_perturbations,
@@ -44,7 +45,7 @@ def needs_exploration(
     However far ahead one effect is of the others about the nominal p_m: some of those explain as much at another. What the
     tangent of an effect promises counts until it is fitted. log_evidence_unknown : ln evidence of a law without a name.
     """
-    found = max(fits, key=lambda fit: fit.evidence, default=nominal)
+    found = find_leading(fits, nominal)
     gain, fitted = found.evidence - nominal.evidence, {fit.hypothesis for fit in fits}
     screened = [each.log_bayes for each in screening.scores if (each.name,) not in fitted]
     best = max([log_evidence_unknown - nominal.evidence, gain, *screened])

@@ -104,9 +104,8 @@ def judge(
     gain |= {fit.hypothesis: fit.evidence - nominal.evidence for fit in rivals}  # re-simulated, where it was
     of_unknown = unknown_evidence - nominal.evidence
     full = [weigh_prior(hypothesis, catalogue) + value for hypothesis, value in gain.items()]
-    full.append(math.log(PRIOR_UNKNOWN) + of_unknown)
-    if gain:
-        full.append(math.log(PRIOR_UNKNOWN) + max(full[:-1]) + beside)
+    on_top = max(full, default=-math.inf) + beside
+    full += [math.log(PRIOR_UNKNOWN) + of_unknown, math.log(PRIOR_UNKNOWN) + on_top]
     most = max([0.0, *gain.values()])
     top = max(most, of_unknown)
     lead = top - (top - most) / unknown_softness
@@ -126,16 +125,14 @@ def judge(
         ]
         softened = min([softened, *behind])
         weight[hypothesis] = weigh_prior(hypothesis, catalogue) + softened + min(value, 0.0)
+    first = max((weight[hypothesis] for hypothesis in gain), default=-math.inf)
     if predicted < PREDICTED:
         predicted = max(predicted, sys.float_info.min)  # that of a bad misfit rounds to nought
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
         odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
-        first = max(weight[hypothesis] for hypothesis in gain)
         weight[("unknown",)] = max(weight[("unknown",)], first + odds)
-    if gain:
-        further = math.log(PRIOR_UNKNOWN) + max(beside, 0.0) / unknown_softness + min(beside, 0.0)
-        first = max(weight[hypothesis] for hypothesis in gain)
-        weight[("unknown",)] = float(np.logaddexp(weight[("unknown",)], first + further))
+    further = math.log(PRIOR_UNKNOWN) + max(beside, 0.0) / unknown_softness + min(beside, 0.0)
+    weight[("unknown",)] = float(np.logaddexp(weight[("unknown",)], first + further))
     spread = logsumexp(full) - logsumexp(list(weight.values()))
     weight = {hypothesis: value + spread for hypothesis, value in weight.items()}
     weight[("none",)] = weigh_prior((), catalogue)

@@ -93,23 +93,26 @@ def write_log(path, text=None, encoding="utf-8", **changes):
     return path
 
 
+def read_range(log):
+    """Attenuation of grey 0 and of the top level."""
+    return tuple(
+        log.number(f"{end} for CS to image conversion", "reconstruction") for end in ("minimum", "maximum")
+    )
+
+
 def test_six_logs(tmp_path):
     new = read_log(write_log(tmp_path / "a.log"))
-    assert (
-        new.voxel == pytest.approx(40e-6)
-        and new.number("maximum for CS to image conversion", "reconstruction") == 0.18
-    )
+    assert new.voxel == pytest.approx(40e-6) and read_range(new) == (0.0, 0.18)
     assert new.text("filename prefix", "acquisition") == "dust"
     assert new.text("Filename Prefix", "reconstruction") == "dust_rec"
     typo = read_log(write_log(tmp_path / "b.log", minimum="Mininum", low="-0.482", hu="ON (65535)"))
-    assert (
-        typo.number("minimum for CS to image conversion", "reconstruction") == -0.482
-        and typo.switch("hu calibration") is True
-    )
+    assert read_range(typo) == (-0.482, 0.18) and typo.switch("hu calibration") is True
     old = read_log(
         write_log(tmp_path / "c.log", "[Acquisition]\r\nIMAGE PIXEL SIZE (UM)= 37,5\r\nNote=a=b\r\n")
     )
-    assert old.voxel == pytest.approx(37.5e-6) and old.text("note") == "a=b"
+    assert (
+        old.voxel == pytest.approx(37.5e-6) and old.text("note") == "a=b" and read_range(old) == (None, None)
+    )
     latin = read_log(
         write_log(tmp_path / "d.log", LOG.format(**FACTS) + "Operator=Gürtler µ\n", encoding="latin-1")
     )

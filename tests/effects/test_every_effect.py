@@ -169,6 +169,7 @@ def test_at_null_nothing_changes_bit_for_bit(name: str) -> None:
         for setting in settings:
             assert hexed(effect.apply(setting, values, place)) == hexed(setting)
         assert effect.apply_to_instrument(Instrument(), values, place) == Instrument()
+    assert effect.amplitudes or not effect.parameters
     assert all(effect.at(values)[each.name] == each.null for each in effect.amplitudes)
 
 

@@ -25,13 +25,21 @@ SHOCKS = [
 ]
 
 
-def side_planes(geometry):
-    edge = COLUMNS * SPACING
+def side_planes(geometry, spacing=SPACING):
+    edge = COLUMNS * spacing
     return (edge,) if geometry == "axisymmetric" else (0.0, edge)
 
 
 def layers_of(state, layer):
     return np.array([np.mean(state[:, layer == k], axis=1) for k in range(layer.max() + 1)]).T
+
+
+def start_p_wave(state, strain, modulus, shear):
+    """A pulse of compression that goes up."""
+    state[rows.W] = math.sqrt((modulus + 4 / 3 * shear) / 300.0) * strain
+    state[rows.DENSITY] *= 1 + strain
+    state[rows.PRESSURE] = modulus * strain
+    state[rows.SZZ], state[rows.SXX] = -4 / 3 * shear * strain, 2 / 3 * shear * strain
 
 
 def front_of(profile, level):
@@ -207,13 +215,10 @@ def test_speed_of_waves(wave, geometry, modulus):
     distance = np.abs(state[rows.Z] - 0.25 * reach)
     strain = np.where(distance < width, 1e-4 * np.cos(0.5 * np.pi * distance / width) ** 2, 0.0)
     row = rows.W if wave == "P" else rows.U
-    state[row] = sound * strain
     if wave == "P":
-        state[rows.DENSITY] *= 1 + strain
-        state[rows.PRESSURE] = modulus * strain
-        state[rows.SZZ], state[rows.SXX] = -4 / 3 * shear * strain, 2 / 3 * shear * strain
+        start_p_wave(state, strain, modulus, shear)
     else:
-        state[rows.SXZ] = -shear * strain
+        state[row], state[rows.SXZ] = sound * strain, -shear * strain
     middle = np.abs(state[rows.X] - columns * SPACING / 2) < 3 * SPACING
     heights = []
 
@@ -249,13 +254,8 @@ def test_order_of_convergence(geometry):
         def strain(place):
             return 1e-4 * np.exp(-0.5 * (place / width) ** 2)
 
-        initial = strain(state[rows.Z] - 0.3 * height)
-        state[rows.W] = sound * initial
-        state[rows.DENSITY] *= 1 + initial
-        state[rows.PRESSURE] = modulus * initial
-        state[rows.SZZ], state[rows.SXX] = -4 / 3 * shear * initial, 2 / 3 * shear * initial
-        edge = COLUMNS * spacing
-        found = evolve_body(setting, state, planes=(edge,) if geometry == "axisymmetric" else (0.0, edge))
+        start_p_wave(state, strain(state[rows.Z] - 0.3 * height), modulus, shear)
+        found = evolve_body(setting, state, planes=side_planes(geometry, spacing))
         exact = sound * strain(found.state[rows.Z] - 0.3 * height - sound * found.log[-1, 0])
         return math.sqrt(np.mean((found.state[rows.W] - exact) ** 2) / np.mean(exact**2))
 

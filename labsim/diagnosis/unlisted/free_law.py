@@ -150,7 +150,7 @@ def fit_hats(problem: Problem, fit: Fit, simulated: Hats) -> Tangents:
     """
     free, kept, index = simulated.problem, simulated.laws, simulated.index
     names, scales = simulated.names, simulated.scales
-    hats = {name: free.effects[name] for name in names}
+    hats = free.effects
     free, formulas, units = add_terms(free)
     scales |= units
     names += formulas
@@ -212,13 +212,25 @@ def weigh_beside(simulated: Hats, fit: Fit) -> float:
         fit.log_p_m,
     )
     low, high = (math.log(p) for p in free.campaign.p_m_range)
-    freedoms = [hats for hats in (choose_hats(found, freedom) for freedom in EMBEDDED) if hats]
     try:
         alone = integrate(found, [], 1.0, (low, high), causes).evidence
-        terms = [integrate(found, hats, size, (low, high), causes) for hats in freedoms for size in SIZES]
+        weighed = weigh_freedoms(found, (low, high), causes)
     except np.linalg.LinAlgError:  # the data say nothing of the cause where its fit ended
         return -math.inf
-    return log_mean([each.evidence for each in terms]) - alone if terms else -math.inf
+    evidences = [one.evidence for each in weighed.values() for one in each]
+    return log_mean(evidences) - alone if evidences else -math.inf
+
+
+def weigh_freedoms(
+    found: Tangents, limits: tuple[float, float], flat: Sequence[str] = ()
+) -> dict[str, list[Marginal]]:
+    """Every freedom that has hats, with coefficients of all SIZES."""
+    hats = {freedom: choose_hats(found, freedom) for freedom in EMBEDDED}
+    return {
+        freedom: [integrate(found, own, size, limits, flat) for size in SIZES]
+        for freedom, own in hats.items()
+        if own
+    }
 
 
 def choose_hats(found: Tangents, freedom: str) -> list[str]:

@@ -18,13 +18,14 @@ import numpy as np
 from ...effects import Effect
 from ...effects.terms import Term, list_terms
 from ...errors import LabsimError
-from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, fit_hypothesis, fit_p_value
+from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, find_leading, fit_hypothesis, fit_p_value
 from ...inference.fits.refine import list_large_effects, refine
 from ...inference.problem import Problem
 from ...records import FloatArray
 from ..explore import FACTORS, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
+from ..screen import HALF
 from .free_law import EMBEDDED, SIZES, Marginal, Tangents, integrate
 from .hats import FreeLaw, add_terms, shape_at
 from .unknown import UnknownFit, log_mean
@@ -48,9 +49,6 @@ MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in 
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
 # a p_m that has run away the tangent may have the wrong sign: there fits on few runs led to 1610 where 1790 is to be had
 MOST_ANEW, SHARES = 2, (1.0, 4.0)
-# of what the best gains: what a place's best term has to gain by few runs, or be behind by no more than these are good to, for
-# it to be begun anew and for the other forms to be tried
-WORTH = 0.5
 ALIKE = 3.0  # ln evidence within which a campaign does not tell two formulas apart
 
 
@@ -72,6 +70,11 @@ class Formula:
     @property
     def sigma(self) -> FloatArray:
         return np.sqrt(np.diag(self.covariance(*self.terms)))
+
+    @property
+    def log_p_m(self) -> tuple[float, float]:
+        """ln p_m with it, and its standard deviation."""
+        return self.fit.log_p_m, math.sqrt(self.fit.covariance[0, 0])
 
     def covariance(self, *parts: Term | Effect) -> FloatArray:
         """Of the coefficients of terms and the amplitudes of causes, in the order asked."""
@@ -177,13 +180,13 @@ def fit_formulas(
             sparse += [found] if found is not None else []
     fits = _refine(problem, nominal, sparse, MOST_SIMULATED)
     if not _explains(fits or [nominal]):
-        best = max(fits, key=lambda fit: fit.evidence, default=nominal)
+        best = find_leading(fits, nominal)
         if any(fit.evidence > best.evidence + LEAST_GAIN for fit in listed):
             # they explain more than any formula alone: what form a law has is told about them, not without them
             fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
             if _explains(fits):
                 return sorted(fits, key=lambda fit: -fit.evidence)
-            best = max(fits, key=lambda fit: fit.evidence, default=nominal)
+            best = find_leading(fits, nominal)
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - _allow(best, nominal)}
         near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
         singles = [names for names in simulated if len(names) == 1 and names in near]
@@ -310,9 +313,7 @@ def fit_siblings(
         if not _explains(found):
             found = _refine_leading(problem, found, 1, refined)
         explained = _explains(found)
-        behind = (
-            ALIKE if explained else _allow(max(found, key=lambda fit: fit.evidence, default=nominal), nominal)
-        )
+        behind = ALIKE if explained else _allow(find_leading(found, nominal), nominal)
         begun = _list_places(found, () if explained else sparse, units, behind)
         if explained:
             further = _list_places(sparse, (), units, math.inf)
@@ -343,8 +344,9 @@ def fit_siblings(
 
 
 def _allow(best: Fit, nominal: Fit) -> float:
-    """How far behind the best in ln evidence a place is still looked at where nothing explains the data."""
-    return max(ROUGH, (1.0 - WORTH) * (best.evidence - nominal.evidence))
+    """How far behind the best in ln evidence a place's best term is, by few runs, where nothing explains the data, for it to be
+    begun anew and for the other forms to be tried."""
+    return max(ROUGH, (1.0 - HALF) * (best.evidence - nominal.evidence))
 
 
 def _rank_place(problem: Problem, place: str) -> int:

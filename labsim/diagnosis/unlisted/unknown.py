@@ -20,7 +20,7 @@ from ...inference.fits.evidence import log_share_inside
 from ...inference.fits.fitting import DOUBTFUL, Fit, fit_p_value
 from ...inference.problem import Problem
 from ...records import FloatArray
-from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, integrate, log_mean
+from .free_law import EMBEDDED, RecoveredLaw, Tangents, average, choose_hats, log_mean, weigh_freedoms
 from .free_law import SIZES as LAW_SIZES
 from .hats import fit_without_runs
 from .wobble import Wobble, fit_wobble
@@ -119,24 +119,15 @@ def fit_unknown(problem: Problem, fit: Fit, tangents: Tangents | None = None) ->
         if best is None or wobble.evidences.max() > best[0]:
             best = (float(wobble.evidences.max()), WOBBLE, 0.0, wobble.law)
     embedded: dict[str, tuple[RecoveredLaw, ...]] = {}
-    for name, places in EMBEDDED.items():
-        if tangents is None:
-            break
-        own = [law for law in tangents.laws if law.name in places and law.knots]
-        hats = choose_hats(tangents, name)
-        if not hats:
-            continue
-        each = [integrate(tangents, hats, size, (low, high)) for size in LAW_SIZES]
-        terms[name] = [one.evidence for one in each]
-        embedded[name], mean = average(own, each)
-        top = max(each, key=lambda one: one.evidence)
-        if best is None or top.evidence > best[0]:
-            best = (
-                top.evidence,
-                name,
-                LAW_SIZES[each.index(top)],
-                tangents.of_drops(hats) @ mean[1:],
-            )
+    if tangents is not None:
+        for name, each in weigh_freedoms(tangents, (low, high)).items():
+            own = [law for law in tangents.laws if law.name in EMBEDDED[name] and law.knots]
+            terms[name] = [one.evidence for one in each]
+            embedded[name], mean = average(own, each)
+            top = max(each, key=lambda one: one.evidence)
+            if best is None or top.evidence > best[0]:
+                drawn = tangents.of_drops(choose_hats(tangents, name)) @ mean[1:]
+                best = (top.evidence, name, LAW_SIZES[each.index(top)], drawn)
     assert best is not None
     evidences = {name: log_mean(values) for name, values in terms.items()}
     nearest = max(embedded, key=lambda name: evidences[name], default="")

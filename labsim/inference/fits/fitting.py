@@ -7,7 +7,7 @@ amplitude nodes that enclose the current estimate, so that the answer never rest
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,6 +151,11 @@ def fit_hypothesis(
         unsettled=float(step.max()),
         between_codes=problem.budget.other_codes,
     )
+
+
+def find_leading(fits: Iterable[Fit], nominal: Fit) -> Fit:
+    """The fit with most evidence; the nominal one where there is none."""
+    return max(fits, key=lambda fit: fit.evidence, default=nominal)
 
 
 def fit_p_value(fit: Fit) -> float:

@@ -250,7 +250,7 @@ def describe_learned(found: Diagnosis) -> dict[str, Any] | None:
     if learned is None:
         return None
     best, gain = learned.best, learned.repeated
-    log_p_m, sigma = best.fit.log_p_m, math.sqrt(best.fit.covariance[0, 0])
+    log_p_m, sigma = best.log_p_m
     return {
         "terms": [
             {"term": term.name, "coefficient": float(c), "sd": float(sd), "unit": term.unit}
@@ -342,7 +342,8 @@ def say_learned(found: Diagnosis) -> list[str]:
     before, after, noise = (
         show_number(1e6 * rms, "{:.1f}") for rms in (gain.rms_nominal, gain.rms_extended, gain.rms_noise)
     )
-    p_m, sigma = math.exp(best.fit.log_p_m) / 1e3, math.sqrt(best.fit.covariance[0, 0])
+    log_p_m, sigma = best.log_p_m
+    p_m = math.exp(log_p_m) / 1e3
     said = [f"a formula for what is missing: {say_formula(best)}"]
     if equation := say_equation(best):
         said.append(f"the equation of motion with it: {equation}")
