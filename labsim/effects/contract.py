@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -70,7 +71,7 @@ class Parameter:
         low, high = self.limits
         return min(max(self.null + amplitude, low), high)
 
-    @property
+    @cached_property
     def is_ratio(self) -> bool:
         """Whether the parameter counts by its ratio to null: it is positive by its prior, and null is no zero."""
         return isinstance(self.prior, LogNormal) and self.null > 0.0
@@ -93,7 +94,7 @@ class Parameter:
             return self
         return replace(self, step=self.hold(self.amplitude_at(times * self.grade(self.step))) - self.null)
 
-    @property
+    @cached_property
     def _whole(self) -> tuple[float, float] | None:
         """The amplitude that doubles what it acts on, and the unit of grades, where these are logarithms."""
         if self.is_ratio:
@@ -114,7 +115,7 @@ class Parameter:
         value = float(self.prior.ppf(rng.uniform(below, above)))
         return min(max(value, self.limits[0]), self.limits[1])
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """How far from null the prior expects the value (root mean square; of a Cauchy law, that has none, its half width): the
         unit of dimensionless amplitudes."""

@@ -14,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 AGAIN = 3.0  # processor time of the second time, over that of importing its libraries in the same minute: machines differ
+TRIES = 3  # others on the machine make a time longer, never shorter: the least of so many is labsim's own
 # xarray imports distributed for a posterior.nc where that is installed, as it is for tests
 LIBRARIES = "import labsim.cli.demo, arviz, corner, distributed, jinja2, matplotlib.pyplot"
 
@@ -160,16 +161,17 @@ def test_a_second_time_takes_seconds_and_gives_the_same(
     case: str, shared_store: str, first: tuple[Path, str], tmp_path: Path
 ) -> None:
     """Each of the two campaigns that the demo shows, by itself."""
-    # on a machine that others use a second of processor time is worth more in one moment than in the next
-    _out, before_it = run_python(["-c", LIBRARIES])
-    _out, seconds = run_demo(shared_store, tmp_path, "--case", case)
-    _out, after_it = run_python(["-c", LIBRARIES])
-    importing = max(before_it, after_it)
-    print(f"{case}: {seconds:.1f} s, importing {importing:.1f} s")
+    importing = seconds = np.inf
+    for _ in range(TRIES):
+        importing = min(importing, run_python(["-c", LIBRARIES])[1])
+        seconds = min(seconds, run_demo(shared_store, tmp_path, "--case", case)[1])
+        print(f"{case}: {seconds:.1f} s, importing {importing:.1f} s")
+        if seconds < AGAIN * importing:
+            break
+    assert seconds < AGAIN * importing
     folder = first[0] if case == "dust" else first[0] / case
     before, after = load(folder, "diagnosis.json"), load(tmp_path, "diagnosis.json")
     assert after["runs_new"] == 0 and after["runs_reused"] >= 40
-    assert seconds < AGAIN * importing
     same = {"dust": ("predictions", "sentence", "stopping_time_ratio"), "clay": ("causes", "gain", "verdict")}
     for key in ("p_m_Pa" if case == "dust" else "cohesion_Pa", "p_value", *same[case]):
         assert after[key] == before[key]

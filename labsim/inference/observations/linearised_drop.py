@@ -202,8 +202,7 @@ def linearise_drop(
         0.0 if with_others else scatter,
     )
     if budget.heights:
-        for expected, sigma in list_speeds(model):
-            drop = _add_speed(drop, expected - instant.log_speed, sigma)
+        drop = _add_speeds(drop, instant.log_speed, list_speeds(model))
     # nuisances are zero-mean about their priors, not about here
     return replace(drop, residual=drop.residual + drop.local @ pull)
 
@@ -225,20 +224,26 @@ def list_speeds(model: RecordModel) -> list[tuple[float, float]]:
     return found
 
 
-def _add_speed(drop: LinearisedDrop, left: float, sigma: float) -> LinearisedDrop:
-    """One more datum: ln v."""
+def _add_speeds(drop: LinearisedDrop, log_speed: float, stated: Sequence[tuple[float, float]]) -> LinearisedDrop:
+    """One more datum each: ln v with its error."""
+    more = np.zeros(len(stated))
+    local = np.zeros((len(stated), drop.local.shape[1]))
+    local[:, 1] = SPEED_WIDTH
 
     def pad(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        return {name: np.append(column, 0.0) for name, column in values.items()}
+        return {name: np.concatenate((column, more)) for name, column in values.items()}
 
     numerical = drop.numerical
-    return LinearisedDrop(
-        np.append(drop.residual, left),
-        np.append(drop.white, sigma**2),
-        np.vstack([drop.local, np.where(np.arange(drop.local.shape[1]) == 1, SPEED_WIDTH, 0.0)]),
-        drop.pull,
-        pad(drop.tangents),
-        pad(drop.shared),
-        replace(numerical, size=np.append(numerical.size, 0.0), fraction=np.append(numerical.fraction, 0.0)),
-        drop.scatter,
+    return replace(
+        drop,
+        residual=np.concatenate((drop.residual, [expected - log_speed for expected, _ in stated])),
+        white=np.concatenate((drop.white, [sigma**2 for _, sigma in stated])),
+        local=np.concatenate((drop.local, local)),
+        tangents=pad(drop.tangents),
+        shared=pad(drop.shared),
+        numerical=replace(
+            numerical,
+            size=np.concatenate((numerical.size, more)),
+            fraction=np.concatenate((numerical.fraction, more)),
+        ),
     )

@@ -62,7 +62,7 @@ class PushModel:
         """What is compared: ln of net resistance over 1 Pa."""
         return self.observed.resistance
 
-    @property
+    @cached_property
     def data_variance(self) -> FloatArray:
         return self.observed.sigma**2
 
@@ -103,7 +103,7 @@ class PushModel:
         """Nothing depends on when it began."""
         return np.zeros(self.data.size)
 
-    @property
+    @cached_property
     def own_errors(self) -> FloatArray:
         """(n, 2 + n): nothing in the place of a camera's surface row, the zero of the gauge at its stated error, the ground."""
         gauge, section = self.observed.drop.gauge, np.pi * self.radius**2
@@ -117,7 +117,12 @@ class PushModel:
         differ: Callable[[str], FloatArray],
         sizes: tuple[float, float, float],
     ) -> dict[str, FloatArray]:
-        """Errors with one value for all records: the profile, window by window, and the scale of the gauge."""
+        """Errors with one value for all records."""
+        return self.common_errors
+
+    @cached_property
+    def common_errors(self) -> dict[str, FloatArray]:
+        """The profile, window by window, and the scale of the gauge."""
         gauge = self.observed.drop.gauge
         assert gauge is not None
         # the reference is what is calibrated; a window is off it by a step of its own
