@@ -88,6 +88,7 @@ KINDS: dict[str, Draw] = {
         "dust": {"weakening": between(g, 0.2, 0.6), "weakening_shear": between(g, 0.1, 0.4)}
     },
     "shear hardens": lambda g: {"dust": {"hardening": between(g, 1.0, 5.0)}},
+    "dust that creeps": lambda g: {"dust": {"creep": [between(g, 0.1, 0.3), between(g, 3e-4, 1e-3)]}},
     "a camera that wobbles": lambda g: {
         "measure": {"wobble": [between(g, 0.4, 1.6), between(g, 150.0, 600.0)]}
     },

@@ -23,6 +23,7 @@ WHERE = {
     "strength of filling factor": STRENGTH,
     "strength of plastic strain": STRENGTH,
     "shear strength of plastic strain": STRENGTH,
+    "strength of time": STRENGTH,
     "force of depth in mm": DEPTH,
     "force alike for all tips": DEPTH,
     "force on the rim": DEPTH,
@@ -96,6 +97,8 @@ def find_law(truth: dict) -> HiddenLaw | None:
         return HiddenLaw((STRENGTH,), damage)
     if "hardening" in dust:
         return HiddenLaw((STRENGTH,), {"shear_hardening": dust["hardening"]})
+    if "creep" in dust:
+        return HiddenLaw((STRENGTH,), dict.fromkeys(("creep", "fast_relaxation", "relaxation")))
     if "wobble" in measure:
         return HiddenLaw((CAMERA,), {})
     if "line_time" in measure:

@@ -36,6 +36,7 @@ class Dust:
     weakening: float = 0.0  # share of Σ that shear can take, and Y with it
     weakening_shear: float = 0.3  # plastic strain that takes half of that
     hardening: float = 0.0  # growth of Y per plastic strain
+    creep: tuple[float, float] = (0.0, 1.0)  # c, τ (s): Σ (1 - c ln(1 + t/τ)) at a time t since contact, and Y with it
 
     @property
     def law(self) -> np.ndarray:
@@ -45,7 +46,7 @@ class Dust:
                 self.p_m, self.phi_1, self.phi_2, self.delta * np.log(10.0), self.bulk_modulus,
                 self.shear_to_bulk, self.shear_factor, self.tensile_factor, self.solid,
                 self.gas_pressure, self.filling_factor, self.eta, self.rate_n,
-                self.weakening, self.weakening_shear, self.hardening,
+                self.weakening, self.weakening_shear, self.hardening, *self.creep, 0.0,
             ]
         )  # fmt: skip
 

@@ -19,6 +19,7 @@ COLUMNS = 10  # PLASTIC: equivalent plastic strain of shear; STRENGTH: factor on
 # entries of what has been spent, J per radian
 STRESS_WORK, VISCOUS, HOURGLASS = range(3)
 EDGE = 0.002  # of φ to the poles of Σ: below it Σ stays as it is there, above it follows its tangent
+LEAST = 0.1  # of Σ, that creep leaves
 SLIP = 1e-3  # m/s, below which friction on the way up is less
 REFERENCE = 0.15  # φ at which the bulk modulus is stated
 
@@ -26,7 +27,8 @@ REFERENCE = 0.15  # φ at which the bulk modulus is stated
 @njit(inline="always")
 def find_strengths(phi, law):
     """Σ and |T| in Pa at φ. law: p_m, φ1, φ2, Δ ln 10, K0, μ/K, shear factor, tensile factor, solid density, gas pressure, φ at
-    the start, rate factor and exponent, share of Σ that shear takes, plastic strain for half of it, growth of Y with it."""
+    the start, rate factor and exponent, share of Σ that shear takes, plastic strain for half of it, growth of Y with it, share of Σ
+    that creep takes with the logarithm of time, its time, the time since contact."""
     p_m, phi_1, phi_2, exponent = law[:4]
     inside = min(max(phi, phi_1 + EDGE), phi_2 - EDGE)
     compressive = p_m * ((inside - phi_1) / (phi_2 - inside)) ** exponent
@@ -58,6 +60,7 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
     """
     k0, shear_to_bulk, shear_factor, solid, gas, phi_start = law[4], law[5], law[6], law[8], law[9], law[10]
     eta, rate_n, weakening, halving, hardening = law[11], law[12], law[13], law[14], law[15]
+    crept = max(1.0 - law[16] * math.log(1.0 + law[18] / law[17]), LEAST)
     linear, quadratic, hourglass = damping
     force_r[:] = 0.0
     force_z[:] = 0.0
@@ -92,7 +95,7 @@ def load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent):
             div = lrr + lzz + hoop
             # pressure
             compressive, tensile = find_strengths(phi, law)
-            compressive *= cell[STRENGTH]
+            compressive *= cell[STRENGTH] * crept
             if weakening > 0.0:
                 compressive *= 1.0 - weakening * (1.0 - 2.0 ** (-cell[PLASTIC] / halving))
             if eta > 0.0 and div < 0.0:
@@ -217,6 +220,7 @@ def advance(r, z, cells, law, damping, body, forces, gravity, courant, end, afte
     crossing = load_nodes(r, z, u, v, 0.0, cells, law, damping, force_r, force_z, spent)
     tip, falling, time, steps, stopped, mass = 0.0, -speed, 0.0, 0, 0, alone
     curve[0] = 0.0, 0.0, -speed, 0.0
+    law = law.copy()
     while time < end and steps < curve.shape[0] - 1:
         dt = courant * crossing
         push, node_work = 0.0, 0.0
@@ -257,6 +261,7 @@ def advance(r, z, cells, law, damping, body, forces, gravity, courant, end, afte
         time += dt
         steps += 1
         curve[steps] = time, tip, falling, push / dt
+        law[18] = time
         crossing = load_nodes(r, z, u, v, dt, cells, law, damping, force_r, force_z, spent)
         if crossing < 0.0:
             return -steps, stopped, energies

@@ -1,6 +1,6 @@
 """Where the equations, or the clock of a camera, have a place for a law that is not in them, one record each.
 
-    m (1 + d(z/a) + k(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) (1 + l(z0)) exp(f(a)), Y (1 + h(ε))]
+    m (1 + d(z/a) + k(z/a)) (d²z/dt² - g) = - F_dust[Σ(φ) (1 + e(φ)) (1 + g(ε)) (1 + l(z0)) (1 + r(t)) exp(f(a)), Y (1 + h(ε))]
                                            - A (b(z/a) + s(z)) - p(z) - 2π a q(z)
                                            - A (c(v) + j(t) + v n(z/a) + v² o(z/a)) - m k'(z/a) v²/a
 
@@ -198,6 +198,12 @@ LAW_PLACES = {
             "a compressive strength of the dust where it lay that is more by a share of", "more strength", "%",
             100.0, LEAST - 1.0, "leaves no strength", 1.0, IN_MM,
             ((SIGMA, "(1 + {})"),), _add_share("strength_of_depth", 1e-3),
+        ),
+        LawPlace(
+            "strength of time", "time since contact", "ms", "1",
+            "a compressive strength, and the shear strength with it, that is more by a share of", "more strength", "%",
+            12.0, LEAST - 1.0, "leaves no strength", 1.0, (0.0, 1.0, 2.0, 4.0),
+            ((SIGMA, "(1 + {})"),), _add_share("strength_of_time", 1e-3),
         ),
         LawPlace(
             "force of speed", "speed", "m/s", "Pa",

@@ -79,6 +79,8 @@ class DropSetting:
         Plastic shear strain and factor on Σ, or on Y.
     strength_of_depth : tuple of (float, float)
         m below the surface, of undisturbed dust, and factor on the Σ that this dust keeps.
+    strength_of_time : tuple of (float, float)
+        s since the start, and factor on the Σ of all dust then.
     force_of_depth, force_of_speed, force_of_time : tuple of (float, float)
         m and N upwards; m/s, or s since the start, and N against the motion.
     viscosity_of_depth, drag_of_depth : tuple of (float, float)
@@ -114,6 +116,7 @@ class DropSetting:
     strength_of_strain: tuple[tuple[float, float], ...] = ()  # (plastic shear strain, factor on Σ)
     shear_of_strain: tuple[tuple[float, float], ...] = ()  # (plastic shear strain, factor on Y)
     strength_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m of undisturbed dust, factor on its Σ)
+    strength_of_time: tuple[tuple[float, float], ...] = ()  # (time s, factor on Σ)
     force_of_depth: tuple[tuple[float, float], ...] = ()  # (depth m, upward force N), linear between
     force_of_speed: tuple[
         tuple[float, float], ...

@@ -256,6 +256,28 @@ def test_a_thin_layer_of_another_strength_does_the_same_in_labsim(middle, factor
     assert ours[1] / ours[0] == pytest.approx(theirs[1] / theirs[0], abs=0.006)
 
 
+@pytest.mark.parametrize("creep", [(0.2, 1e-3), (0.4, 3e-4), (-0.3, 1e-3)])
+def test_a_strength_that_goes_with_time_does_the_same_in_labsim(creep):
+    """Depths move by 4, 34 and -4 %, alike to 0.5 % of the depth, times to 1.5 %; the mesh closes its book."""
+    share, first = creep
+    time = np.linspace(0.0, 0.02, 401)
+    law = tuple(zip(time, 1.0 - share * np.log1p(time / first), strict=True))
+    setting = DropSetting(
+        Projectile("hemisphere", RADIUS, mesh.BEAD * RADIUS**3), 0.5, Material(), spacing=RADIUS / 5
+    )
+    numerics = mesh.Numerics(cells=10.0)
+    theirs = [
+        mesh.run_drop(mesh.Dust(**each), RADIUS, 0.5, numerics) for each in ({}, {"creep": creep})
+    ]
+    ours = [simulate(each) for each in (setting, setting.replace(strength_of_time=law))]
+    moved = theirs[1].stopping_depth / theirs[0].stopping_depth
+    assert abs(moved - 1.0) > 0.03 and (moved > 1.0) == (share > 0.0)
+    assert ours[1].penetration_depth / ours[0].penetration_depth == pytest.approx(moved, abs=0.005)
+    later = theirs[1].stopping_time / theirs[0].stopping_time
+    assert ours[1].stopping_time / ours[0].stopping_time == pytest.approx(later, abs=0.015)
+    assert all(abs(each.energy_error) < 0.005 for each in (*theirs, *ours))
+
+
 def test_after_its_stop_a_drop_comes_up_and_closes_its_book():
     stop = mesh.run_drop(mesh.Dust(), RADIUS, 0.30)
     rest = mesh.run_drop(mesh.Dust(), RADIUS, 0.30, after=2.0)

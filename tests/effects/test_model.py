@@ -181,6 +181,7 @@ LAWS = {  # one term of every place that a run knows, as large as a campaign may
     "shaft_drag": 400.0,
     "shaft_viscosity": 200.0,
     "time_ramp": 80.0,
+    "creep": -0.25,
     "stuck_mass": 0.15,
     "gathered_mass": 0.15,
     "size_power": 0.4,

@@ -52,6 +52,7 @@ def test_every_term_is_what_its_page_says(name):
                 changed.strength_of_strain,
                 changed.shear_of_strain,
                 changed.strength_of_depth,
+                changed.strength_of_time,
             )
             if law
         ]

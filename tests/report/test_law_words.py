@@ -196,6 +196,7 @@ def a_formula(evidence: float = 50.0, **coefficients: tuple[float, float]) -> Fo
         ({"shaft_drag": (820.0, 40.0)}, "m z″ = m g − F_dust − A v² (820 ± 40) Pa s²/m² × z/a"),
         ({"shaft_viscosity": (82.0, 4.0)}, "m z″ = m g − F_dust − A v (82.0 ± 4.0) Pa s/m × z/a"),
         ({"time_ramp": (82.0, 4.0)}, "m z″ = m g − F_dust − A (82.0 ± 4.0) Pa × t/ms"),
+        ({"creep": (-0.2, 0.1)}, "m z″ = m g − F_dust[Σ (1 + (−0.20 ± 0.10) × ln(1 + t/ms))]"),
         ({"rolling_shutter": (5.0, 0.1)}, ""),
         (
             {"rolling_shutter": (5.0, 0.1), "viscous_drag": (264.0, 28.0)},

@@ -154,6 +154,7 @@ def test_stress_turns_with_the_body():
         {"strength_of_strain": ((0.0, 1.0), (0.5, 2.0))},
         {"shear_of_strain": ((0.0, 1.0), (0.5, 0.4))},
         {"strength_of_depth": ((0.0, 1.5), (1.0, 1.5))},
+        {"strength_of_time": ((0.0, 1.0), (1e-3, 0.5))},
         {"strength_rate": 0.03},
     ],
 )

@@ -249,6 +249,30 @@ def test_a_factor_on_the_strength_at_all_depths_is_one_on_the_strength():
     assert deep.penetration_depth < 0.95 * plain.penetration_depth
 
 
+def test_the_strength_goes_with_the_time():
+    """Compressed to a φ within a time, Σ is the factor of then times the usual one, and stays what it is after the last knot; a
+    factor of one changes nothing that counts, and 1.5 at all times is Σ(φ) itself multiplied."""
+    material = Material(p_m=1300.0)
+    usual = float(sirono.compressive_strength(np.array([0.2]), material)[0])
+    for half, factor in ((1.0, 0.75), (0.25, 0.5)):
+        lump = OneParticle(material, strength_of_time=((0.0, 1.0), (2.0 * half, 0.5)))
+        lump.move(0.2, 4000)  # within a second
+        assert lump.pressure == pytest.approx(factor * usual, rel=2e-3)
+    setting = DropSetting(Projectile("hemisphere", 5e-4, 1.33e-6), 0.3, Material(), spacing=5e-4 / 4)
+    plain, one, always, everywhere = (
+        simulate(setting.replace(**terms)).penetration_depth
+        for terms in (
+            {},
+            {"strength_of_time": ((0.0, 1.0),)},
+            {"strength_of_time": ((0.0, 1.5), (1.0, 1.5))},
+            {"strength_shape": ((0.0, 1.5),)},
+        )
+    )
+    assert one == pytest.approx(plain, rel=1e-9)
+    assert always == pytest.approx(everywhere, rel=1e-9)
+    assert always < 0.95 * plain
+
+
 def test_dust_keeps_the_strength_of_the_depth_where_it_lay():
     """Inside a layer Σ is the factor times the usual one; half in it (to half an entry of the table), the harmonic mean."""
     material, layer = Material(p_m=1300.0), ((1.0e-3, 1.0), (1.0e-3 + 1e-9, 3.0), (2.0e-3, 3.0))

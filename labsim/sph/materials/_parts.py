@@ -26,6 +26,7 @@ TERMS = {
     "strength_of_strain": (),
     "shear_of_strain": (),
     "strength_of_depth": (),
+    "strength_of_time": (),
     "crust_excess": 0.0,
     "filling_gradient": 0.0,
 }

@@ -6,7 +6,7 @@
 rate and returns radially to √(3 J2) = Y (von Mises, hoop stress included).
 Optional terms: Σ (1 + η ε̇ⁿ) (1 + μ log10(ε̇/ε̇0)) with ε̇ the rate of compression; trapped gas p + P0 ((1 - φi)/(1 - φ) - 1);
 factors on Σ and on Y that go with the plastic shear strain, the sum of (√(3 J2) - Y)/(3 G) over all returns to the yield surface;
-a factor on Σ that dust keeps from the depth where it lay.
+a factor on Σ that dust keeps from the depth where it lay; a factor on Σ that goes with the time since the start.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ TERMS = tuple(parts.TERMS)  # of a setting that it takes: all
 
 LAYERS_PER_SPACING = 20  # entries of the table of what goes with the depth
 STRAIN_TOP, STRAIN_SIZE = 4.0, 401  # of the table of what goes with the plastic strain; beyond it is constant
+TIME_SIZE = 1001  # entries of the table of what goes with the time, which ends at its last knot
 PER_STRAIN = (STRAIN_SIZE - 1) / STRAIN_TOP
 
 sound_speed = parts.sound_speed
@@ -56,23 +57,27 @@ sound_speed = parts.sound_speed
 
 class State(NamedTuple):
     """Rows that this law carries: φ0', Σ and |T| at the particle's φ (Pa), and, where something goes with it, the plastic shear
-    strain."""
+    strain and the time since the start (s)."""
 
     zero_stress: FloatArray
     compressive: FloatArray
     tensile: FloatArray
     sheared: FloatArray
+    age: FloatArray
 
 
 class Tables(NamedTuple):
     """strengths : over φ; of_strain, shear_of_strain : factors on Σ and Y over the plastic strain, empty where both are one;
-    of_depth : on Σ over the depth that dust lay at, empty where it is one; per_depth : its entries a metre."""
+    of_depth : on Σ over the depth that dust lay at, empty where it is one; per_depth : its entries a metre; of_time, per_time : the
+    same over the time since the start, and its entries a second."""
 
     strengths: sirono.Strengths
     of_strain: FloatArray
     shear_of_strain: FloatArray
     of_depth: FloatArray
     per_depth: float
+    of_time: FloatArray
+    per_time: float
 
 
 class Constants(NamedTuple):
@@ -95,12 +100,13 @@ def start(setting: DropSetting, phi: FloatArray, pressure: FloatArray | float) -
     sound = np.sqrt(stiffness * (1 + 4 / 3 * material.shear_to_bulk) / (phi * setting.monomer_density))
     nothing = np.zeros(phi.size)
     zero_stress = sirono.zero_stress_filling_factor(phi, nothing + pressure, material)
-    return State(zero_stress, nothing, nothing, nothing), sound
+    return State(zero_stress, nothing, nothing, nothing, nothing), sound
 
 
 def bearable_pressure(setting: DropSetting, phi: FloatArray) -> FloatArray:
     """What dust at rest may carry without crushing, Pa."""
     weakest = min((factor for _, factor in setting.strength_of_depth), default=1.0)
+    weakest *= setting.strength_of_time[0][1] if setting.strength_of_time else 1.0
     return 0.8 * min(weakest, 1.0) * sirono.compressive_strength(phi, setting.material)
 
 
@@ -133,7 +139,8 @@ def make_constants(setting: DropSetting) -> Constants:
     """The numbers of the law as the compiled update wants them."""
     material = setting.material
     (rate,) = parts.read_parameters(setting, parts.RATE)
-    tabled = setting.strength_of_strain or setting.shear_of_strain or setting.strength_of_depth
+    of_strain = setting.strength_of_strain or setting.shear_of_strain
+    tabled = of_strain or setting.strength_of_depth or setting.strength_of_time
     plain = material.bulk_exponent == 4.0 and not rate.on and setting.pore_gas == 0.0 and not tabled
     extras = () if plain else (1,)
     return Constants(
@@ -145,15 +152,15 @@ def make_constants(setting: DropSetting) -> Constants:
 def make_tables(setting: DropSetting) -> Tables:
     """What the compiled update looks up."""
     strengths = sirono.tabulate_strengths(setting.material, setting.strength_shape)
-    of_depth, per_depth = _tabulate_layers(setting)
+    places = (*_tabulate_layers(setting), *_tabulate_times(setting))
     if not (setting.strength_of_strain or setting.shear_of_strain):
-        return Tables(strengths, np.zeros(0), np.zeros(0), of_depth, per_depth)
+        return Tables(strengths, np.zeros(0), np.zeros(0), *places)
     strain = np.linspace(0.0, STRAIN_TOP, STRAIN_SIZE)
     of_strain, shear_of_strain = (
         np.interp(strain, *np.asarray(law or ((0.0, 1.0),), dtype=float).T)
         for law in (setting.strength_of_strain, setting.shear_of_strain)
     )
-    return Tables(strengths, of_strain, shear_of_strain, of_depth, per_depth)
+    return Tables(strengths, of_strain, shear_of_strain, *places)
 
 
 def _tabulate_layers(setting: DropSetting) -> tuple[FloatArray, float]:
@@ -169,6 +176,15 @@ def _tabulate_layers(setting: DropSetting) -> tuple[FloatArray, float]:
     trapezoid = np.ones(fine + 1) / fine
     trapezoid[[0, -1]] *= 0.5
     return 1.0 / np.convolve(1.0 / factor, trapezoid, "valid"), fine / setting.spacing
+
+
+def _tabulate_times(setting: DropSetting) -> tuple[FloatArray, float]:
+    """Factors on Σ over the time since the start, and their number a second."""
+    if not setting.strength_of_time:
+        return np.zeros(0), 0.0
+    times, factors = np.asarray(setting.strength_of_time, dtype=float).T
+    last = max(float(times[-1]), 1e-9)
+    return np.interp(np.linspace(0.0, last, TIME_SIZE), times, factors), (TIME_SIZE - 1) / last
 
 
 @compiled
@@ -194,6 +210,7 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
     phi_zero, compressive, tensile, phi_initial = own.zero_stress, own.compressive, own.tensile, s.initial
     sheared, strained = own.sheared, not plain and tables.of_strain.size > 0
     laid, layered = s.laid, not plain and tables.of_depth.size > 0
+    age, aging = own.age, not plain and tables.of_time.size > 0
     sxx, szz, sxz, pressure, sound = s.sxx, s.szz, s.sxz, s.pressure, s.sound
     work, exchanged, crushing, yield_square = s.work, s.exchanged, s.crushing, s.yield_square
     inverse_step = (sirono.TABLE_SIZE - 1) / sirono.TABLE_TOP / solid_density
@@ -219,6 +236,9 @@ def update(low, high, dt, axisymmetric, s, own, constants, tables):
             strength *= interpolate(tables.of_strain, sheared[i] * PER_STRAIN)
         if layered:
             strength *= interpolate(tables.of_depth, laid[i] * tables.per_depth)
+        if aging:
+            age[i] += dt
+            strength *= interpolate(tables.of_time, age[i] * tables.per_time)
         x = phi_zero[i]
         k = k0 * sirono.raise_to(x * (1.0 / 0.15), gamma, plain)
         trial = k * (phi / x - 1.0)
