@@ -27,8 +27,8 @@ REFERENCE = 0.15  # φ at which the bulk modulus is stated
 @njit(inline="always")
 def find_strengths(phi, law):
     """Σ and |T| in Pa at φ. law: p_m, φ1, φ2, Δ ln 10, K0, μ/K, shear factor, tensile factor, solid density, gas pressure, φ at
-    the start, rate factor and exponent, share of Σ that shear takes, plastic strain for half of it, growth of Y with it, share of Σ
-    that creep takes with the logarithm of time, its time, the time since contact."""
+    the start, rate factor and exponent, share of Σ that shear takes, plastic strain for half of it, growth of Y with it, share
+    of Σ that creep takes with the logarithm of time, its time, the time since contact."""
     p_m, phi_1, phi_2, exponent = law[:4]
     inside = min(max(phi, phi_1 + EDGE), phi_2 - EDGE)
     compressive = p_m * ((inside - phi_1) / (phi_2 - inside)) ** exponent

@@ -266,9 +266,7 @@ def test_a_strength_that_goes_with_time_does_the_same_in_labsim(creep):
         Projectile("hemisphere", RADIUS, mesh.BEAD * RADIUS**3), 0.5, Material(), spacing=RADIUS / 5
     )
     numerics = mesh.Numerics(cells=10.0)
-    theirs = [
-        mesh.run_drop(mesh.Dust(**each), RADIUS, 0.5, numerics) for each in ({}, {"creep": creep})
-    ]
+    theirs = [mesh.run_drop(mesh.Dust(**each), RADIUS, 0.5, numerics) for each in ({}, {"creep": creep})]
     ours = [simulate(each) for each in (setting, setting.replace(strength_of_time=law))]
     moved = theirs[1].stopping_depth / theirs[0].stopping_depth
     assert abs(moved - 1.0) > 0.03 and (moved > 1.0) == (share > 0.0)

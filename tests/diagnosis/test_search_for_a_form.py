@@ -143,6 +143,7 @@ def beside(monkeypatch):
         learned_law, "fit_from_strengths", lambda problem, nominal, names, top: make_fit(names[0])
     )
     monkeypatch.setattr(learned_law, "fit_anew", lambda *given: [])
+    monkeypatch.setattr(learned_law, "_begin_anew", lambda *given: [])
     monkeypatch.setattr(learned_law, "list_large_effects", lambda problem, fit: [])
     monkeypatch.setattr(learned_law, "fit_p_value", lambda fit: 0.4 if fit.hypothesis in explained else 1e-9)
     return asked, explained
@@ -161,6 +162,18 @@ def test_a_law_is_told_about_the_listed_cause_that_explains_more_than_any_formul
     # what was tried alone is what was chosen: no form of every place
     assert {names for names, _ in asked if len(names) == 1} <= set(chosen)
     assert (("surface_crust", "inertial_drag"), True) in asked
+
+
+def test_what_takes_no_runs_is_searched_before_what_does(beside) -> None:
+    """The right form of mass is not the one that is weighed first; once it explains the data, nothing dear has runs of its own."""
+    asked, explained = beside
+    explained.add(("stuck_mass",))
+    chosen = [("layer_at_1_mm",), ("hardening",), ("stuck_cap",), ("viscous_drag",)]
+    fits = learned_law.fit_formulas(PROBLEM, NOMINAL, chosen, UNITS)
+    assert fits[0].hypothesis == ("stuck_mass",)
+    own = [names for names, sparse in asked if not sparse]
+    assert ("stuck_mass",) in own
+    assert all(PROBLEM.acts_on_projectile(name) for names in own for name in names)
 
 
 def test_a_formula_has_three_parts_at_most(beside) -> None:

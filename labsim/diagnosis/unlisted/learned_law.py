@@ -166,32 +166,49 @@ def fit_formulas(
     listed: Sequence[Fit] = (),
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
-    them among runs about themselves. units : of all terms, those first that are weighed first; open_places : whose forms are
-    tried in any case; listed : causes that explain most, which a term may stand beside."""
-    simulated = [names for names in chosen if any(map(problem.affects_simulation, names))]
+    them among runs about themselves. What takes no runs is first, from several sizes too where nothing explains the data: how far
+    it leads is how far all others must.
+
+    units : of all terms, those first that are weighed first; open_places : whose forms are tried in any case; listed : causes
+    that explain most, which a term may stand beside.
+    """
+
     sparse: list[Fit] = []
-    for names in chosen:
-        if names not in simulated:  # it costs nothing, and says how far a formula must come
-            sparse += _fit(problem, names, (nominal.log_p_m, {}), nominal)
-    for names in simulated:  # before there are more runs, which few ones do not stand beside
-        top = max([nominal.evidence, *(fit.evidence for fit in sparse)])
-        with suppress(LabsimError):
-            found = fit_from_strengths(problem, nominal, names, top)
-            sparse += [found] if found is not None else []
-    fits = _refine(problem, nominal, sparse, MOST_SIMULATED)
+
+    def begin(chosen: Sequence[Hypothesis]) -> None:
+        for names in chosen:  # before there are more runs, which few ones do not stand beside
+            top = max([nominal.evidence, *(fit.evidence for fit in sparse)])
+            with suppress(LabsimError):
+                found = fit_from_strengths(problem, nominal, names, top)
+                sparse.extend([found] if found is not None else [])
+
+    singles = [names for names in chosen if len(names) == 1]
+    seen = [names for names in singles if not problem.affects_simulation(*names)]
+    pushed = [names for names in singles if problem.acts_on_projectile(*names)]
+    for names in seen:
+        sparse += _fit(problem, names, (nominal.log_p_m, {}), nominal)
+    begin(pushed)
+    if not _explains(sparse or [nominal]):
+        again = [fit for (name,) in pushed for fit in _begin_anew(problem, nominal, name, units[name])]
+        sparse = take_better([*sparse, *again])
+    begin([names for names in chosen if len(names) > 1])
+    fits, searched = list[Fit](), set[str]()
+    if not _explains(sparse or [nominal]) and not _is_ahead(listed, find_leading(sparse, nominal)):
+        fits = fit_siblings(problem, nominal, fits, sparse, units, searched=searched, free=True)
+    begin([names for names in singles if names not in seen and names not in pushed])
+    fits += _refine(problem, nominal, sparse, MOST_SIMULATED, fits)
     if not _explains(fits or [nominal]):
         best = find_leading(fits, nominal)
-        if any(fit.evidence > best.evidence + LEAST_GAIN for fit in listed):
+        if _is_ahead(listed, best):
             # they explain more than any formula alone: what form a law has is told about them, not without them
             fits = take_better([*fits, *fit_further(problem, listed, [*fits, *sparse], units)])
             if _explains(fits):
                 return sorted(fits, key=lambda fit: -fit.evidence)
             best = find_leading(fits, nominal)
         near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - _allow(best, nominal)}
-        near |= {names for names in simulated if all(map(problem.acts_on_projectile, names))}
-        singles = [names for names in simulated if len(names) == 1 and names in near]
-        fits = take_better([*fits, *fit_anew(problem, nominal, singles, units)])
-    fits = fit_siblings(problem, nominal, fits, sparse, units, open_places)
+        dear = [names for names in singles if names in near and names not in (*seen, *pushed)]
+        fits = take_better([*fits, *fit_anew(problem, nominal, dear, units)])
+    fits = fit_siblings(problem, nominal, fits, sparse, units, open_places, searched=searched)
     while not _explains(fits or [nominal]):
         further = fit_further(problem, [*fits[:1], *listed], [*fits, *sparse], units)
         if not further:
@@ -251,30 +268,35 @@ def _list_forms(place: str, units: Mapping[str, float], known: Collection[str]) 
 def fit_anew(
     problem: Problem, nominal: Fit, singles: Sequence[Hypothesis], units: Mapping[str, float]
 ) -> list[Fit]:
-    """The terms that get furthest before p_m is moved, fitted from there; of those whose laws take no runs, once it has moved."""
+    """The terms that get furthest before p_m is moved, fitted from there with runs of their own."""
     # few runs do not stand beside more: they get names of their own
     probes = {f"{name} anew": problem.effects[name] for (name,) in singles}
     probing = replace(problem, effects={**problem.effects, **probes})
-    begun: dict[Hypothesis, list[Fit]] = {}
-    for (name,), probe in zip(singles, probes, strict=True):
-        sizes = [sign * share * units[name] for sign in (1.0, -1.0) for share in SHARES]
-        for strength in _list_strengths(problem, nominal):
-            starts = [fit for size in sizes for fit in _start(probing, probe, strength, size, nominal)]
-            starts = sorted(starts, key=lambda fit: -fit.evidence)[:1]
-            if problem.acts_on_projectile(name):
-                starts = [
-                    fit
-                    for each in starts
-                    for fit in _fit(probing, each.hypothesis, (each.log_p_m, each.values), each, sparse=True)
-                ]
-            begun.setdefault((name,), []).extend(starts)
+    begun = {
+        names: _begin_anew(probing, nominal, probe, units[names[0]])
+        for names, probe in zip(singles, probes, strict=True)
+    }
     best = {names: max(fit.evidence for fit in starts) for names, starts in begun.items() if starts}
-    fits = []
-    for names in sorted(best, key=lambda names: -best[names])[:MOST_ANEW]:
-        for start in begun[names]:
-            values = dict(zip(names, start.values.values(), strict=True))
-            fits += _fit(problem, names, (start.log_p_m, values), start)
-    return fits
+    return [
+        fit
+        for names in sorted(best, key=lambda names: -best[names])[:MOST_ANEW]
+        for start in begun[names]
+        for fit in _fit(
+            problem, names, (start.log_p_m, dict(zip(names, start.values.values(), strict=True))), start
+        )
+    ]
+
+
+def _begin_anew(problem: Problem, nominal: Fit, name: str, unit: float) -> list[Fit]:
+    """The best size of a term, by its unit, at each of several strengths; followed where its law takes no runs."""
+    sizes, found = [sign * share * unit for sign in (1.0, -1.0) for share in SHARES], []
+    for strength in _list_strengths(problem, nominal):
+        starts = [fit for size in sizes for fit in _start(problem, name, strength, size, nominal)]
+        for each in sorted(starts, key=lambda fit: -fit.evidence)[:1]:
+            free = problem.acts_on_projectile(name)
+            begin = (each.log_p_m, each.values)
+            found += _fit(problem, (name,), begin, each, sparse=True) if free else [each]
+    return found
 
 
 def _list_strengths(problem: Problem, nominal: Fit) -> list[float]:
@@ -300,31 +322,40 @@ def fit_siblings(
     sparse: Sequence[Fit],
     units: Mapping[str, float],
     open_places: Collection[str] = (),
+    *,
+    searched: set[str] | None = None,
+    free: bool = False,
 ) -> list[Fit]:
     """The fits, and the other terms of their places, begun where the best formula with a term there ended and as large: which
     form a law has cannot be told about a p_m that is far from the truth's. MOST_TRIED of a place, as ``units`` has them in order.
 
     Places of the best formula, of those hardly told from it, and ``open_places``; until something explains the data all places
-    that few runs (``sparse``) lead to, one after another: those that take no runs first, the dear ones last. The best,
-    in the end MOST_REFINED of them, have runs about themselves.
+    that few runs (``sparse``) lead to, one after another: those that take no runs first, the dear ones last. ``free`` : those
+    alone. The best has runs about itself once it is ahead of what few runs promise there, in the end MOST_REFINED of them.
+    searched : places whose forms were tried, added to.
     """
-    found, seen, refined = list(fits), set[str](), set[Hypothesis]()
+    found, refined = list(fits), set[Hypothesis]()
+    searched = set() if searched is None else searched
     while True:
-        if not _explains(found):
-            found = _refine_leading(problem, found, 1, refined)
         explained = _explains(found)
-        behind = ALIKE if explained else _allow(find_leading(found, nominal), nominal)
-        begun = _list_places(found, () if explained else sparse, units, behind)
+        best = find_leading(found or sparse, nominal)
+        behind = ALIKE if explained else _allow(best, nominal)
+        begun = _list_places(found or sparse, () if explained else sparse, units, behind)
         if explained:
             further = _list_places(sparse, (), units, math.inf)
             begun |= {
                 place: further[place] for place in open_places if place in further and place not in begun
             }
-        left = [each for each in begun if each not in seen]
-        place = min(left, key=lambda each: _rank_place(problem, each), default=None)
+        ranks = {each: _rank_place(problem, each) for each in begun if each not in searched}
+        left = [each for each in ranks if ranks[each] == 0 or not free]
+        place = min(left, key=lambda each: ranks[each], default=None)
+        promised = max((begun[each][0].evidence for each in ranks if ranks[each] == 0), default=-math.inf)
+        if found and not explained and best.evidence >= promised and best.hypothesis not in refined:
+            found = _refine_leading(problem, found, 1, refined)
+            continue
         if place is None:
-            return _refine_leading(problem, found, MOST_REFINED, refined)
-        seen.add(place)
+            return found if free else _refine_leading(problem, found, MOST_REFINED, refined)
+        searched.add(place)
         start, size = begun[place]
         known = {fit.hypothesis[0] for fit in found if len(fit.hypothesis) == 1}
         siblings: list[Fit] = []
@@ -340,7 +371,7 @@ def fit_siblings(
                 with suppress(LabsimError):
                     again = fit_from_strengths(problem, nominal, (name,), top)
                     siblings += [again] if again is not None else []
-        found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS)])
+        found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS, found)])
 
 
 def _allow(best: Fit, nominal: Fit) -> float:
@@ -371,6 +402,11 @@ def list_open_places(unknown: UnknownFit) -> list[str]:
     return [place for place in ranked if alone[place] > alone[ranked[0]] - ALIKE]
 
 
+def _is_ahead(fits: Sequence[Fit], best: Fit) -> bool:
+    """Whether one of some fits is clearly better than another."""
+    return any(fit.evidence > best.evidence + LEAST_GAIN for fit in fits)
+
+
 def _explains(fits: Sequence[Fit]) -> bool:
     """Whether the best of some fits explains the data."""
     best = max(fits, key=lambda fit: fit.evidence, default=None)
@@ -392,13 +428,14 @@ def _list_places(
 
 
 def _refine_leading(problem: Problem, fits: Sequence[Fit], most: int, refined: set[Hypothesis]) -> list[Fit]:
-    """The fits, the best first; ``most`` of these among runs about themselves where they are large."""
+    """The fits, the best first; ``most`` of these, no more than ROUGH behind it, among runs about themselves where large."""
     ordered = sorted(fits, key=lambda fit: -fit.evidence)
     for k, fit in enumerate(ordered[:most]):
-        if fit.hypothesis not in refined and list_large_effects(problem, fit):
+        if fit.hypothesis not in refined and fit.evidence > ordered[0].evidence - ROUGH:
             refined.add(fit.hypothesis)
-            with suppress(LabsimError):
-                ordered[k] = refine(problem, fit)
+            if list_large_effects(problem, fit):
+                with suppress(LabsimError):
+                    ordered[k] = refine(problem, fit)
     return sorted(ordered, key=lambda fit: -fit.evidence)
 
 
@@ -411,14 +448,18 @@ def take_better(fits: Sequence[Fit]) -> list[Fit]:
     return list(found.values())
 
 
-def _refine(problem: Problem, nominal: Fit, sparse: Sequence[Fit], most: int) -> list[Fit]:
-    """Those that come as far as the best of them, but for what few runs leave open, ``most`` at most, with runs of their own."""
-    top = max((fit.evidence for fit in sparse), default=0.0)
+def _refine(
+    problem: Problem, nominal: Fit, sparse: Sequence[Fit], most: int, known: Sequence[Fit] = ()
+) -> list[Fit]:
+    """Those that come as far as the best of them, and of what is ``known`` with runs of its own, but for what few runs leave
+    open; ``most`` at most, with runs of their own."""
+    top = max((fit.evidence for fit in (*sparse, *known)), default=0.0)
     rough = max(ROUGH, ROUGH_SHARE * (top - nominal.evidence))
-    near = sorted((fit for fit in sparse if fit.evidence > top - rough), key=lambda fit: -fit.evidence)
+    done = {fit.hypothesis for fit in known}
+    near = [fit for fit in sparse if fit.evidence > top - rough and fit.hypothesis not in done]
     return [
         fit
-        for each in near[:most]
+        for each in sorted(near, key=lambda fit: -fit.evidence)[:most]
         for fit in _fit(problem, each.hypothesis, (each.log_p_m, each.values), each)
     ]
 

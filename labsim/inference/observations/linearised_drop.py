@@ -224,7 +224,9 @@ def list_speeds(model: RecordModel) -> list[tuple[float, float]]:
     return found
 
 
-def _add_speeds(drop: LinearisedDrop, log_speed: float, stated: Sequence[tuple[float, float]]) -> LinearisedDrop:
+def _add_speeds(
+    drop: LinearisedDrop, log_speed: float, stated: Sequence[tuple[float, float]]
+) -> LinearisedDrop:
     """One more datum each: ln v with its error."""
     more = np.zeros(len(stated))
     local = np.zeros((len(stated), drop.local.shape[1]))

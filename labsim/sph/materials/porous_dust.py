@@ -68,8 +68,8 @@ class State(NamedTuple):
 
 class Tables(NamedTuple):
     """strengths : over φ; of_strain, shear_of_strain : factors on Σ and Y over the plastic strain, empty where both are one;
-    of_depth : on Σ over the depth that dust lay at, empty where it is one; per_depth : its entries a metre; of_time, per_time : the
-    same over the time since the start, and its entries a second."""
+    of_depth : on Σ over the depth that dust lay at, empty where it is one; per_depth : its entries a metre; of_time, per_time :
+    the same over the time since the start, and its entries a second."""
 
     strengths: sirono.Strengths
     of_strain: FloatArray
