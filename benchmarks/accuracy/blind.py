@@ -97,6 +97,7 @@ def describe_evidence(found: Diagnosis) -> dict:
         "unknown": found.unknown.evidence - nominal,
         "block": found.unknown.block,
         "predicted": found.predicted,
+        "beside": found.unknown.beside if math.isfinite(found.unknown.beside) else None,
         "catalogue": list(found.problem.effects),
         "felt": bool(found.problem.felt),
     }

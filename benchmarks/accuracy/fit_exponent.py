@@ -20,7 +20,7 @@ import pandas as pd
 from benchmarks.accuracy.blind import name_hypothesis, read_rows
 from labsim.diagnosis import judge
 
-EXPONENTS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0)
 NOT_CAUSES = ("none", "unknown")
 
 
@@ -39,6 +39,9 @@ def judge_again(row: dict, temperature: float) -> dict[str, float]:
         found["catalogue"],
         found["screened"],
         found["predicted"],
+        beside=-math.inf
+        if found.get("beside") is None
+        else found["beside"],  # rows before 2026-12-01 have none
     )
     return {name_hypothesis(causes): probability for causes, probability in verdict.probabilities}
 

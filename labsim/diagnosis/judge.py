@@ -15,12 +15,10 @@ from ..inference.fits.fitting import Fit, Hypothesis
 PRIOR_NONE = 0.5
 PRIOR_UNKNOWN = 0.1
 PRIOR_PAIRS = 0.1  # all pairs together
-# among causes: what tells one from another rests on details in which two solvers differ (benchmarks/accuracy/fit_exponent.py);
-# and behind one that changes runs which accelerometers feel: what it changes of a force is as rough as that is
-TEMPERATURE, ROUGH_TEMPERATURE = 3.0, 10.0
-# of a part of the best pair, and of unknown, a cause with more freedom than any listed one. On fifty campaigns of two other
-# solvers a second effect that was not there gained at most 5.5, the weakest that was 9.6
-NESTED = 2.0
+# by which differences in ln evidence are divided among all that is not none: two codes differ by as much as what tells one cause
+# from another (benchmarks/accuracy/fit_exponent.py); among causes that change runs which accelerometers feel: what such a cause
+# changes of a force is as rough as that is
+TEMPERATURE, ROUGH_TEMPERATURE = 2.5, 10.0
 # p value of the best cause's held-out drops, or of its own data, below which what is not listed gets the odds that it allows
 PREDICTED = 0.05
 # probability that what a verdict names holds together; and that one of two causes has to get where it is the one, on average, if
@@ -83,18 +81,15 @@ def judge(
     predicted: float = 1.0,
     rough: Collection[str] = (),
     beside: float = -math.inf,
-    unknown_softness: float = NESTED,
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
-    None has what the evidences give it against all others. These share the rest: behind what explains most they fall off by the
-    difference of their gains over the temperature (NESTED for parts of the best, ``unknown_softness`` for unknown), since they
-    are told apart by residuals of the size of the solver's own error. Of two singles the one with more evidence always stands
-    first.
+    None has what the evidences give it against all others. These share the rest by their priors times their evidences to the
+    power of 1/TEMPERATURE: a coarsened likelihood, after Miller & Dunson (2019). Causes behind the best one fall off by
+    ROUGH_TEMPERATURE where that is among ``rough``.
 
     beside : ln Bayes factor of a free law on top of the best cause over that cause alone. That something unlisted is at work too
-    is as likely beforehand as that it is at work alone. rough : causes behind which ROUGH_TEMPERATURE holds. unknown_softness :
-    by which what unknown and the best cause differ by is divided, and what is beside.
+    is as likely beforehand as that it is at work alone.
     screened: ln Bayes factor against nominal, from the linear screening, for singles that were not re-simulated. predicted :
     p value of held-out drops with the best cause, or of its own data. Where they are missed, unknown stands to that cause at
     least as its prior does to that of all causes, times the largest Bayes factor that such a p value allows, 1/(-e p ln p):
@@ -102,52 +97,37 @@ def judge(
     """
     gain: dict[Hypothesis, float] = {(name,): gained for name, gained in screened.items()}
     gain |= {fit.hypothesis: fit.evidence - nominal.evidence for fit in rivals}  # re-simulated, where it was
-    of_unknown = unknown_evidence - nominal.evidence
-    full = [weigh_prior(hypothesis, catalogue) + value for hypothesis, value in gain.items()]
+    prior = {hypothesis: weigh_prior(hypothesis, catalogue) for hypothesis in gain}
+    of_unknown, of_none = unknown_evidence - nominal.evidence, weigh_prior((), catalogue)
+    full = [prior[hypothesis] + value for hypothesis, value in gain.items()]
     on_top = max(full, default=-math.inf) + beside
     full += [math.log(PRIOR_UNKNOWN) + of_unknown, math.log(PRIOR_UNKNOWN) + on_top]
-    most = max([0.0, *gain.values()])
-    top = max(most, of_unknown)
-    lead = top - (top - most) / unknown_softness
-    ahead = {name for hypothesis, value in gain.items() if value == most for name in hypothesis}
-    nested = [max(value, 0.0) for hypothesis, value in gain.items() if set(hypothesis) < ahead]
-    temperature = _choose_temperature(ahead, rough)
-    softened = top - (top - max(of_unknown, 0.0)) / unknown_softness
-    weight: dict[Hypothesis, float] = {
-        ("unknown",): math.log(PRIOR_UNKNOWN) + softened + min(of_unknown, 0.0)
+    best = max(gain, key=lambda hypothesis: gain[hypothesis], default=())
+    temperature = _choose_temperature(best, rough)
+    weight = {
+        hypothesis: prior[hypothesis] + gain[best] / TEMPERATURE - (gain[best] - value) / temperature
+        for hypothesis, value in gain.items()
     }
-    for hypothesis, value in gain.items():
-        above = max(value, 0.0)
-        softened = lead - (most - above) / (NESTED if set(hypothesis) < ahead else temperature)
-        # what explains less than a part of the best never stands before that part
-        behind = [
-            lead - (most - part) / NESTED - (part - above) / temperature for part in nested if part >= above
-        ]
-        softened = min([softened, *behind])
-        weight[hypothesis] = weigh_prior(hypothesis, catalogue) + softened + min(value, 0.0)
-    first = max((weight[hypothesis] for hypothesis in gain), default=-math.inf)
+    first = max(weight.values(), default=-math.inf)
+    alone, further = of_unknown / TEMPERATURE, first + beside / TEMPERATURE
     if predicted < PREDICTED:
         predicted = max(predicted, sys.float_info.min)  # that of a bad misfit rounds to nought
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))
-        odds = math.log(PRIOR_UNKNOWN / (1 - PRIOR_NONE - PRIOR_UNKNOWN)) + bound
-        weight[("unknown",)] = max(weight[("unknown",)], first + odds)
-    further = math.log(PRIOR_UNKNOWN) + max(beside, 0.0) / unknown_softness + min(beside, 0.0)
-    weight[("unknown",)] = float(np.logaddexp(weight[("unknown",)], first + further))
+        alone = max(alone, first - math.log(1 - PRIOR_NONE - PRIOR_UNKNOWN) + bound)
+    weight[("unknown",)] = math.log(PRIOR_UNKNOWN) + float(np.logaddexp(alone, further))
     spread = logsumexp(full) - logsumexp(list(weight.values()))
-    weight = {hypothesis: value + spread for hypothesis, value in weight.items()}
-    weight[("none",)] = weigh_prior((), catalogue)
+    weight = {hypothesis: value + spread for hypothesis, value in weight.items()} | {("none",): of_none}
     total = logsumexp(list(weight.values()))
     ranked = sorted(
         ((name, math.exp(value - total)) for name, value in weight.items()), key=lambda item: -item[1]
     )
-    best = ranked[0][0]
-    word = best[0] if best in (("none",), ("unknown",)) else "effect"
+    word = ranked[0][0][0] if ranked[0][0] in (("none",), ("unknown",)) else "effect"
     return Verdict(word, ranked)
 
 
 def _choose_temperature(first: Collection[str], rough: Collection[str]) -> float:
-    """By which differences in ln evidence from the best are divided: one for all, or one with less could stand before one with
-    more."""
+    """By which causes' differences in ln evidence from the best are divided: one for all, or one with less could stand before one
+    with more."""
     return ROUGH_TEMPERATURE if first and set(first) <= set(rough) else TEMPERATURE
 
 

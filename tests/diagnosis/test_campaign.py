@@ -12,7 +12,7 @@ import pytest
 from labsim.campaign import read_campaign
 from labsim.diagnosis import campaign
 from labsim.diagnosis.campaign import diagnose_campaign
-from labsim.diagnosis.judge import NESTED, PRIOR_PAIRS, TEMPERATURE, judge
+from labsim.diagnosis.judge import PRIOR_PAIRS, TEMPERATURE, judge
 from labsim.inference.fits.blocks import Block
 from labsim.inference.fits.fitting import Fit
 from labsim.inference.observations.linearised_drop import ErrorBudget
@@ -79,10 +79,10 @@ def test_probabilities_follow_bayes():
     share = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4
     something = share * (math.exp(3) + math.exp(0.5) + math.exp(-2)) + 0.1 * math.exp(-1)  # by the evidences
     weight = {
-        ("a",): share * math.exp(3),
-        ("b",): share * math.exp(3 - (3 - 0.5) / TEMPERATURE),  # gains count a share of their difference
-        ("c",): share * math.exp(3 - 3 / TEMPERATURE - 2),  # losses in full
-        ("unknown",): 0.1 * math.exp(3 - 3 / NESTED - 1),
+        ("a",): share * math.exp(3 / TEMPERATURE),
+        ("b",): share * math.exp(0.5 / TEMPERATURE),
+        ("c",): share * math.exp(-2 / TEMPERATURE),
+        ("unknown",): 0.1 * math.exp(-1 / TEMPERATURE),
     }
     shared = sum(weight.values())
     weight = {name: value * something / shared for name, value in weight.items()} | {("none",): 0.5}
@@ -108,7 +108,7 @@ def test_a_cause_that_does_not_predict_held_out_drops_stands_back_behind_unknown
         assert found["unknown",] / found["a",] == pytest.approx(odds)
     else:
         share = (1 - 0.5 - 0.1 - PRIOR_PAIRS) / 4
-        odds = 0.1 / share * math.exp(-90.0 / NESTED - 1.0)
+        odds = 0.1 / share * math.exp(-91.0 / TEMPERATURE)
         assert found["unknown",] / found["a",] == pytest.approx(odds)
     assert sum(found.values()) == pytest.approx(1.0)
 
@@ -148,8 +148,8 @@ def test_a_pair_must_earn_its_second_effect():
         )
         return found["a", "b"] / found["a",] * prior
 
-    assert ratio(6.0) == pytest.approx(math.exp(6.0 / NESTED))
-    assert ratio(8.0) == pytest.approx(math.exp(8.0 / NESTED))
+    assert ratio(6.0) == pytest.approx(math.exp(6.0 / TEMPERATURE))
+    assert ratio(8.0) == pytest.approx(math.exp(8.0 / TEMPERATURE))
 
 
 @pytest.mark.parametrize(("p_value", "judged"), [(0.3, [0.4]), (1e-9, [0.02])])

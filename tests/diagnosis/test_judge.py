@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from labsim.diagnosis.judge import NESTED, PRIOR_NONE, PRIOR_UNKNOWN, Verdict, judge, weigh_prior
+from labsim.diagnosis.judge import PRIOR_NONE, PRIOR_UNKNOWN, TEMPERATURE, Verdict, judge, weigh_prior
 
 SHEAR, TENSILE, GAS, NONE = ("shear_strength",), ("tensile_strength",), ("pore_gas",), ("none",)
 
@@ -36,7 +36,7 @@ def test_where_nothing_listed_is_at_work_no_cause_is_named(word):
 @pytest.mark.parametrize("lead", [0.5, 6.0, 30.0])
 @pytest.mark.parametrize("rough", [(), ("first",), ("first", "second"), ("first", "second", "other")])
 def test_a_single_with_less_evidence_never_stands_before_one_with_more(gains, lead, rough):
-    """Behind a pair too, whose own singles are softened less than others; and where some causes are rough."""
+    """Behind a pair too, and where some causes are rough."""
     names = ["first", "second", "other"]
     fits = [
         SimpleNamespace(hypothesis=(name,), evidence=gain) for name, gain in zip(names, gains, strict=True)
@@ -65,14 +65,14 @@ def test_a_cause_is_at_work_alone_or_beside_another():
 
 
 @pytest.mark.parametrize("unknown", [-3.0, 0.0, 10.0, 29.0, 31.0, 60.0])
-def test_unknown_is_softened_as_a_part_of_a_pair_is_and_none_counts_in_full(unknown):
+def test_unknown_is_softened_as_a_cause_is_and_none_counts_in_full(unknown):
     """A cause that only imitates what nobody listed is a few in ln evidence ahead: two solvers differ by as much."""
     gains, catalogue = {"first": 30.0, "other": 20.0}, ["first", "other"]
     fits = [SimpleNamespace(hypothesis=(name,), evidence=gain) for name, gain in gains.items()]
     found = dict(judge(SimpleNamespace(evidence=0.0), fits, unknown, catalogue, {}).probabilities)
     prior = {name: weigh_prior((name,), catalogue) for name in catalogue}
     ahead = math.log(found["first",] / found["unknown",] * PRIOR_UNKNOWN) - prior["first"]
-    assert ahead == pytest.approx((30.0 - max(unknown, 0.0)) / NESTED - min(unknown, 0.0))
+    assert ahead == pytest.approx((30.0 - unknown) / TEMPERATURE)
     full = sum(math.exp(prior[name] + gain) for name, gain in gains.items())
     full += PRIOR_UNKNOWN * math.exp(unknown)
     assert found["none",] == pytest.approx(PRIOR_NONE / (PRIOR_NONE + full))
@@ -87,7 +87,7 @@ def test_what_is_unlisted_may_be_at_work_on_top_of_the_best_cause(beside):
     alone = dict(judge(nominal, fits, 10.0, catalogue, {}).probabilities)
     found = dict(judge(nominal, fits, 10.0, catalogue, {}, beside=beside).probabilities)
     more = found["unknown",] / found["first",] - alone["unknown",] / alone["first",]
-    assert more == pytest.approx(PRIOR_UNKNOWN * math.exp(max(beside, 0.0) / NESTED + min(beside, 0.0)))
+    assert more == pytest.approx(PRIOR_UNKNOWN * math.exp(beside / TEMPERATURE))
     assert found["other",] / found["first",] == pytest.approx(alone["other",] / alone["first",])
     against_none = (1.0 - found["none",]) / found["none",] - (1.0 - alone["none",]) / alone["none",]
     first = math.exp(weigh_prior(("first",), catalogue) + 30.0)

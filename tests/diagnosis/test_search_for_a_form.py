@@ -165,7 +165,7 @@ def test_a_law_is_told_about_the_listed_cause_that_explains_more_than_any_formul
 
 
 def test_what_takes_no_runs_is_searched_before_what_does(beside) -> None:
-    """The right form of mass is not the one that is weighed first; once it explains the data, nothing dear has runs of its own."""
+    """The right form of mass is not the one that is weighed first; once it explains the data, nothing dear has its own runs."""
     asked, explained = beside
     explained.add(("stuck_mass",))
     chosen = [("layer_at_1_mm",), ("hardening",), ("stuck_cap",), ("viscous_drag",)]
