@@ -57,7 +57,7 @@ FELT_SPACINGS = (0.975, 1.025)
 # longer steps of effects there: what a usual step changes of the force is no more than two runs differ by in their roughness
 # (benchmarks/acceleration/effect_roughness.py)
 FELT_STEPS = 4.0
-# of scans, and of fingerprints in them: the map needs more than the depth does
+# of scans, and of a first look at what effects change of them: the map needs more than the depth does
 SCAN_CELLS, COARSE_SCAN_CELLS = 8, 6
 
 Change = Callable[[DropSetting], DropSetting]
@@ -91,7 +91,7 @@ class ProjectileGroup:
 class Request:
     """Runs of all groups at one p_m node. variant : a name for ``change``, empty for the nominal model.
 
-    sparse : of fingerprints, at few speeds, of scans with wider spacings. rough : for a first look, of films with wider spacings.
+    sparse : of fingerprints, at few speeds. rough : for a first look, as these are, with wider spacings.
     integrated : what acts on the projectile alone is taken from the nominal model's runs (deflection.py), at all speeds, as far
     as they know it.
     """
@@ -305,7 +305,7 @@ class RunGrid:
             usual = max(self.cells, FELT_CELLS)
         elif rough:
             usual = min(self.cells, max(COARSE_CELLS, self.cells * COARSE_CELLS // DEFAULT_CELLS))
-        of_scan = COARSE_SCAN_CELLS if sparse else SCAN_CELLS
+        of_scan = COARSE_SCAN_CELLS if sparse or rough else SCAN_CELLS
         own = of_scan if group.is_scan else PUSH_CELLS if group.pushed else usual
         after_stop = SETTLING if group.is_scan or group.pushed or group.felt else LIFTING
         setting = set_nominal_drop(self.campaign, group.projectile, speed, p_m, own, after_stop)
