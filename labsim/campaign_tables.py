@@ -92,18 +92,22 @@ def read_projectile(table: Table, folder: Path | None = None, *, led: bool = Fal
     sigma = table.sigma_key("mass_mg")
     if led and not table.has("mass_mg"):
         table.known.add("mass_mg")
-        tip, shape = read_tip(table, ("tip_radius_mm", "length_mm"), folder)
-        radius = table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3)
+        tip, shape = read_tip(table, ("tip_radius_mm", "tip_radius_sigma_mm", "length_mm"), folder)
+        radius, radius_sigma = _read_radius(table)
         length = table.number("length_mm", 0.1, 1e5, unit=1e-3, default=0.0)
-        return Projectile(tip, radius, STEEL * 4 / 3 * math.pi * radius**3, length=length, shape=shape)
-    tip, shape = read_tip(table, ("tip_radius_mm", "length_mm", "mass_mg", sigma), folder)
+        mass = STEEL * 4 / 3 * math.pi * radius**3
+        return Projectile(tip, radius, mass, length=length, radius_sigma=radius_sigma, shape=shape)
+    keys = ("tip_radius_mm", "tip_radius_sigma_mm", "length_mm", "mass_mg", sigma)
+    tip, shape = read_tip(table, keys, folder)
+    radius, radius_sigma = _read_radius(table)
     projectile = Projectile(
         tip=tip,
         shape=shape,
-        tip_radius=table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3),
+        tip_radius=radius,
         length=table.number("length_mm", 0.1, 500.0, unit=1e-3, default=0.0),
         mass=table.number("mass_mg", 1e-3, 1e7, unit=1e-6),
         mass_sigma=table.number(sigma, 0.0, 1e6, unit=1e-6, default=0.0),
+        radius_sigma=radius_sigma,
     )
     _check_density(table, projectile)
     if projectile.mass_sigma >= projectile.mass:
@@ -115,6 +119,17 @@ def read_projectile(table: Table, folder: Path | None = None, *, led: bool = Fal
             "length_mm", f"{projectile.length * 1e3:g} is shorter than the tip's radius; give the whole rod"
         )
     return projectile
+
+
+def _read_radius(table: Table) -> tuple[float, float]:
+    """Of a tip, m, with its standard deviation."""
+    radius = table.number("tip_radius_mm", 0.05, 50.0, unit=1e-3)
+    sigma = table.number("tip_radius_sigma_mm", 0.0, 50.0, unit=1e-3, default=0.0)
+    if sigma >= radius:
+        raise table.wrong(
+            "tip_radius_sigma_mm", f"{sigma * 1e3:g} is not below tip_radius_mm; check the unit"
+        )
+    return radius, sigma
 
 
 def read_bead(table: Table) -> Projectile:

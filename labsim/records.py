@@ -130,8 +130,8 @@ class Projectile:
     ----------
     tip : str
         A file of ``labsim/sph/tips``, or the path of one.
-    tip_radius, length : float
-        m; length is that of the whole rod, 0 where it does not matter.
+    tip_radius, radius_sigma, length : float
+        m; the standard deviation of the radius; the length of the whole rod, 0 where it does not matter.
     mass, mass_sigma : float
         kg (planar: kg per metre of cylinder), with its standard deviation.
     shape : tuple of (str, float)
@@ -143,12 +143,13 @@ class Projectile:
     mass: float  # kg (planar: kg per metre of cylinder)
     mass_sigma: float = 0.0
     length: float = 0.0  # m, of the whole rod; 0 where it does not matter
+    radius_sigma: float = 0.0
     shape: tuple[tuple[str, float], ...] = ()  # SI, the tip's own numbers that are not at their defaults
 
     @property
     def simulated(self) -> Projectile:
         """The same without what no simulation depends on: drops of equal ones share their runs."""
-        return replace(self, mass_sigma=0.0, length=0.0)
+        return replace(self, mass_sigma=0.0, radius_sigma=0.0, length=0.0)
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,7 @@ DROP = """# One drop; the name of this folder is its name. Copy the folder for t
 [projectile]                        # rigid
 tip = "hemisphere"                  # the end of a rod of the same radius; or "sphere": a bead
 tip_radius_mm = 0.5                 # half the diameter of tip and rod
+# tip_radius_sigma_mm = 0.005       # optional: of the calliper
 length_mm = 4.0                     # of the whole rod; of a bead its diameter
 mass_mg = 1.33                      # of the projectile
 mass_sigma_mg = 0.01                # of the balance

@@ -41,7 +41,7 @@ from ..runs.store import Progress, RunStore
 from .average import average_p_m
 from .explore import EXPLORED, explore, needs_exploration
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
-from .judge import PREDICTED, PRIOR_UNKNOWN, Verdict, find_class, judge, weigh_prior
+from .judge import PREDICTED, PRIOR_UNKNOWN, TEMPERATURE, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
 from .next_experiment import Suggestion, suggest, suggest_between_formulas
 from .pairs import confirm_pairs, refine_leading, return_to_singles
@@ -170,6 +170,7 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
         predicted,
         _list_rough(problem),
         unknown.beside,
+        1.0 if problem.pushed or problem.felt else TEMPERATURE,  # that was measured on films
     )
     first = verdict.probabilities[0][0]
     if first == ("unknown",):  # the nearest that the catalogue comes to it

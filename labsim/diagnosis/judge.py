@@ -81,12 +81,13 @@ def judge(
     predicted: float = 1.0,
     rough: Collection[str] = (),
     beside: float = -math.inf,
+    against_unknown: float = TEMPERATURE,
 ) -> Verdict:
     """Posterior probabilities of all hypotheses.
 
     None has what the evidences give it against all others. These share the rest by their priors times their evidences to the
     power of 1/TEMPERATURE: a coarsened likelihood, after Miller & Dunson (2019). Causes behind the best one fall off by
-    ROUGH_TEMPERATURE where that is among ``rough``.
+    ROUGH_TEMPERATURE where that is among ``rough``; unknown stands to the best one by ``against_unknown``.
 
     beside : ln Bayes factor of a free law on top of the best cause over that cause alone. That something unlisted is at work too
     is as likely beforehand as that it is at work alone.
@@ -105,11 +106,11 @@ def judge(
     best = max(gain, key=lambda hypothesis: gain[hypothesis], default=())
     temperature = _choose_temperature(best, rough)
     weight = {
-        hypothesis: prior[hypothesis] + gain[best] / TEMPERATURE - (gain[best] - value) / temperature
+        hypothesis: prior[hypothesis] + gain[best] / against_unknown - (gain[best] - value) / temperature
         for hypothesis, value in gain.items()
     }
     first = max(weight.values(), default=-math.inf)
-    alone, further = of_unknown / TEMPERATURE, first + beside / TEMPERATURE
+    alone, further = of_unknown / against_unknown, first + beside / against_unknown
     if predicted < PREDICTED:
         predicted = max(predicted, sys.float_info.min)  # that of a bad misfit rounds to nought
         bound = -1.0 - math.log(predicted) - math.log(-math.log(predicted))

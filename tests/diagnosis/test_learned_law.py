@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from labsim.diagnosis.unlisted.free_law import Tangents, gather
-from labsim.diagnosis.unlisted.hats import STEP, USUAL, FreeLaw, find_peak, make_effect
+from labsim.diagnosis.unlisted.hats import STEP, USUAL, FreeLaw, find_peak, list_laws, make_effect
 from labsim.diagnosis.unlisted.learned_law import (
     MOST_WEIGHED,
     choose_formulas,
@@ -19,6 +20,7 @@ from labsim.diagnosis.unlisted.learned_law import (
 from labsim.effects.law_places import LAW_PLACES
 from labsim.effects.terms import add_term, list_terms
 from labsim.inference.fits.blocks import Block
+from labsim.inference.observations.tracks import Tracks
 from labsim.records import Material, Projectile
 from labsim.sph import DropSetting
 
@@ -133,3 +135,27 @@ def test_a_term_as_an_effect_is_the_term():
     parameter = effect.amplitudes[0]
     assert parameter.limits[0] == 0.0 and parameter.step == STEP * 250.0
     assert parameter.prior.sd == USUAL * 250.0
+
+
+@pytest.mark.parametrize("longest", [3.0, 8.0, 40.0])
+def test_limits_of_a_strength_lie_on_its_scale_however_long_a_drop_takes(longest):
+    """A factor has a logarithm down to its limit: drops of 40 ms, longer than such a law goes on changing, once left none."""
+    drop = SimpleNamespace(deepest=longest / 2e3, radius=5e-4)  # of 1 m/s, slowed evenly
+    tracks = object.__new__(Tracks)
+    object.__setattr__(tracks, "models", (drop,))
+    problem = SimpleNamespace(
+        observations=(tracks,),
+        groups=[SimpleNamespace(projectile=SimpleNamespace(tip_radius=5e-4))],
+        campaign=SimpleNamespace(
+            sample=SimpleNamespace(filling_factor=0.15), material=SimpleNamespace(phi_2=0.58)
+        ),
+    )
+    place = LAW_PLACES["strength of time"]
+    laws = list_laws(problem, SimpleNamespace(nuisances=(np.zeros((1, 4)),)))
+    [law] = [law for law in laws if law.place is place]
+    assert law.reach[1] == pytest.approx(min(longest, place.reach))
+    for term in list_terms().values():
+        if term.place == place.name:
+            unit = place.scale / find_peak(term, law)
+            low, _ = term.limits
+            assert math.isfinite(make_effect(term, unit).amplitudes[0].grade(low))

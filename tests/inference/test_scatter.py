@@ -17,6 +17,7 @@ from labsim.inference.emulation.forward import Instant, predict_depth
 from labsim.inference.fits.fitting import fit_hypothesis, fit_p_value, keep_strengths
 from labsim.inference.fits.tangents import linearise_at
 from labsim.inference.measure import measure
+from labsim.inference.observations import linearised_drop
 from labsim.inference.scatter import (
     WIDTH,
     allow_scatter,
@@ -25,8 +26,10 @@ from labsim.inference.scatter import (
     set_error_budget,
     weigh_least,
 )
+from labsim.records import Material, Projectile
 from labsim.report.campaign_tables import list_samples
 from labsim.runs.store import RunStore
+from labsim.sph import DropSetting, simulate
 
 CAMPAIGN = Path(__file__).parents[2] / "data" / "campaigns" / "p01"
 DROPS, POINTS = 15, 6
@@ -102,9 +105,9 @@ def one_rod(shared_store):
     campaign = replace(campaign, drops=drops, scans=())
     seen = measure(campaign)
 
-    def open_with(offsets, stated=None, weighed=0.0):
-        """weighed : stated error of the rod's mass, relative."""
-        body = replace(rod, mass_sigma=weighed * rod.mass)
+    def open_with(offsets, stated=None, weighed=0.0, measured=0.0):
+        """weighed, measured : stated errors of the rod's mass and radius, relative."""
+        body = replace(rod, mass_sigma=weighed * rod.mass, radius_sigma=measured * rod.tip_radius)
         other = replace(campaign, sample=replace(campaign.sample, scatter=stated))
         moved = [
             replace(stretch(drop, math.exp(-0.3 * offset)), drop=replace(drop.drop, projectile=body))
@@ -129,12 +132,32 @@ def test_p_m_is_as_uncertain_as_its_samples_scatter(one_rod):
     assert added == pytest.approx(math.sqrt((scatter.value**2 - 0.02**2) / OFFSETS.size), rel=0.3)
 
 
-def test_a_rod_that_is_weighed_once_is_off_in_all_its_drops(one_rod):
-    """D goes as m^0.9 and p_m^-0.3: 2 % of the mass are 6 % of p_m, however many drops there are."""
+@pytest.mark.parametrize("what, of_strength", [("weighed", 1.85), ("measured", 2.1)])
+def test_a_rod_that_is_weighed_and_measured_once_is_off_in_all_its_drops(one_rod, what, of_strength):
+    """2 % of the mass are 3.7 % of p_m, and 2 % of the radius 4.2 %, however many drops there are."""
     exact, rough = (
-        math.sqrt(one_rod(0 * OFFSETS, weighed=share)[1].covariance[0, 0]) for share in (0.0, 0.02)
+        math.sqrt(one_rod(0 * OFFSETS, **{what: share})[1].covariance[0, 0]) for share in (0.0, 0.02)
     )
-    assert math.sqrt(rough**2 - exact**2) == pytest.approx(0.06, rel=0.05)
+    assert math.sqrt(rough**2 - exact**2) == pytest.approx(0.02 * of_strength, rel=0.05)
+
+
+@pytest.mark.parametrize("speed, of_mass, of_radius", [(0.25, 1.77, 1.64), (0.6, 1.95, 2.5)])
+def test_mass_and_radius_change_a_drop_as_a_strength_does(speed, of_mass, of_radius):
+    """Depth and stopping time alike, by ratios that a mesh of quadrilaterals gives too (p_m 1300 Pa, 0.5 mm)."""
+
+    def drop(strength=1.0, mass=1.0, radius=1.0):
+        body = Projectile("hemisphere", 5e-4 * radius, 1.33e-6 * mass)
+        run = simulate(DropSetting(body, speed, Material(p_m=1300.0 * strength), spacing=body.tip_radius / 6))
+        return np.log([run.penetration_depth, run.stopping_time])
+
+    by_strength, by_mass, by_radius = (
+        (drop(**{name: math.exp(step)}) - drop(**{name: math.exp(-step)})) / (2 * step)
+        for name, step in (("strength", 0.1), ("mass", 0.05), ("radius", 0.05))
+    )
+    assert -by_mass / by_strength == pytest.approx([of_mass] * 2, rel=0.06)
+    assert by_radius / by_strength == pytest.approx([of_radius] * 2, rel=0.12)
+    assert linearised_drop.MASS_TO_STRENGTH == pytest.approx(of_mass, rel=0.1)
+    assert linearised_drop.RADIUS_TO_STRENGTH == pytest.approx(of_radius, rel=0.3)
 
 
 def test_samples_alike_keep_the_least_scatter(one_rod):

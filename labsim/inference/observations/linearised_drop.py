@@ -22,7 +22,9 @@ from .push_model import PushModel
 RecordModel = DropModel | AccelerationModel | PushModel  # of what one instrument records of one drop or push
 SPEED_SLACK = 0.002  # of the speed, beside the stated error of the height (guide, release)
 USUAL_DEPTH = 0.5  # ln of depth over tip radius, where p_m makes up for all of the solver's error
-MASS_TO_STRENGTH = 3.0  # d ln p_m that mimics d ln m: D goes as m^0.9 and as p_m^-0.3
+# d ln p_m that mimics d ln m, d ln a: D and T_s go alike, as m^0.5 to m^0.6, a^-0.4 to a^-0.8, p_m^-0.3. The ratios are 1.7 to
+# 2.0 and 1.6 to 2.7, more the deeper the drop, in labsim and on a mesh (tests/inference/test_scatter.py)
+MASS_TO_STRENGTH, RADIUS_TO_STRENGTH = 1.85, 2.1
 LEAST_SCATTER = 1e-9
 # ln of final depth over tip radius, of radius, of mass over its cube: so far two codes differ alike
 ALIKE = (REACH, 2.0, 1.5)
@@ -170,6 +172,8 @@ def linearise_drop(
     }
     if body.mass_sigma > 0.0:  # it was weighed once
         shared[f"mass of {body}"] = by_strength * MASS_TO_STRENGTH * body.mass_sigma / body.mass
+    if body.radius_sigma > 0.0:  # and measured once
+        shared[f"radius of {body}"] = by_strength * RADIUS_TO_STRENGTH * body.radius_sigma / body.tip_radius
     for setting, (amplitude, sigma) in model.numerics.items():
         if model.table.knows(setting):
             moved = model.predict(features + response.change(setting, amplitude), instrument, instant)
