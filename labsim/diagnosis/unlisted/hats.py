@@ -97,10 +97,9 @@ def list_laws(problem: Problem, fit: Fit) -> tuple[FreeLaw, ...]:
             grid = tuple(depth for depth in depths if depth == 0.0 or depth >= THIN * radii[0])
             laws.append(FreeLaw(place, grid, grid, (0.0, deepest_mm)))
         elif place.simulated:
+            # beyond its reach a law is constant, and limits of terms are those up to there
             most = {"tip radii": deepest, "m/s": fastest, "ms": longest}.get(place.unit, place.reach)
-            most = min(
-                most, place.reach
-            )  # a law is constant beyond, and limits of terms are those up to there
+            most = min(most, place.reach)
             # nought where nothing has moved: a force that does not change with speed is one of depth, a strength that does not
             # with strain is p_m
             reached = _reached(place.knots, most)[int(place.least > -math.inf) :]
