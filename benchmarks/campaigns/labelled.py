@@ -54,7 +54,7 @@ def name_hidden(hidden: dict) -> dict:
     elif "layers" in dust:
         amplitude, period = dust.pop("layers")
         profile = {"kind": "layers", "df": amplitude, "period": period}
-    sample = {key: hidden[key] for key in ("small_strength",) if key in hidden}
+    sample = {key: hidden[key] for key in ("small_strength", "floor") if key in hidden}
     return {
         "cause": hidden["cause"],
         "pm": float(hidden["pm"]),

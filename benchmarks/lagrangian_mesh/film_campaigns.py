@@ -52,7 +52,7 @@ def run(hidden: dict, radius: float, mass: float, speed: float, p_m: float, *, b
         larger = (radius / SMALL) ** POWERS.get(name, 0)
         if not (bead and name in ON_SHAFT):
             terms[name] = (value[0] * larger, value[1]) if name == "film" else value * larger
-    numerics = Numerics(cells=CELLS, depth=DEPTH)
+    numerics = Numerics(cells=CELLS, depth=DEPTH, floor=hidden.get("floor", math.inf))
     dust = Dust(p_m=p_m, **labelled.set_dust(hidden))
     try:
         found = run_drop(

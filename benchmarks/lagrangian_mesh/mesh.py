@@ -88,6 +88,7 @@ class Numerics:
     even: float = 1.5  # tip radii from the axis and from the surface
     width: float = 6.0  # tip radii
     depth: float = 6.0  # tip radii
+    floor: float = np.inf  # m, of a hard bottom that lies higher
     courant: float = 0.6
     linear: float = 0.02  # bulk viscosity
     quadratic: float = 1.2
@@ -190,6 +191,9 @@ def run_drop(
     h = radius / numerics.cells
     edges_r = grade(numerics.even * radius, numerics.width * radius, h, numerics.growth)
     edges_z = grade(numerics.even * radius, numerics.depth * radius, h, numerics.growth)
+    if numerics.floor < edges_z[-1]:
+        last = int(np.argmin(np.abs(edges_z - numerics.floor)))
+        edges_z = edges_z[: last + 1] * numerics.floor / edges_z[last]
     r, z = (np.ascontiguousarray(x) for x in np.meshgrid(edges_r, -edges_z, indexing="ij"))
     cells = lay_mesh(r, z, dust, gravity)
     elastic = find_elastic_energy(cells, dust)

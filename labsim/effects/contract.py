@@ -35,6 +35,7 @@ from .priors import Cauchy, HalfNormal, LogNormal, Normal, Prior, Uniform
 Kind = Literal["material", "sample", "contact", "projectile", "measurement", "numerics"]
 KINDS: tuple[Kind, ...] = ("material", "sample", "contact", "projectile", "measurement", "numerics")
 OBSERVABLES = ("penetration_depth", "stopping_time", "compacted_volume")
+TANGENT = 0.05  # of a parameter's step, by its grade, that tangents are taken over
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class Parameter:
     null: the value that switches the effect off (for ``shape`` parameters, which do not matter at the null of the others:
     the value taken where nothing else is said). step: for tangents, towards the natural side. prior: its reason stands
     in ``text``. symbol: as it is printed. doubles: the amplitude at which what it acts on is twice what it is at null, of an
-    amplitude that acts in proportion and may be many times that.
+    amplitude that acts in proportion and may be many times that. fades: the change of the amplitude that makes what it does e
+    times as large, of one that does nothing until it is far from null.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Parameter:
     shape: bool = False
     symbol: str = ""
     doubles: float = math.inf
+    fades: float = math.inf
 
     def log_prior(self, value: FloatArray | float) -> np.ndarray:
         """ln of the prior density cut off at the limits, -inf outside; integrates to one between them."""
@@ -78,19 +81,35 @@ class Parameter:
 
     def grade(self, amplitude: float) -> float:
         """Where an amplitude lies on the scale on which what it does is smooth: ln of the ratio to null of what counts by that,
-        of the factor of what doubles, the amplitude itself of all else. A factor of 0.1 is as far from 0.2 as 0.5 from 1."""
+        of the factor of what doubles, e to the amplitude over ``fades``, less 1, the amplitude itself of all else. A factor of
+        0.1 is as far from 0.2 as 0.5 from 1."""
+        if math.isfinite(self.fades):
+            return math.copysign(self.fades * math.expm1(abs(amplitude) / self.fades), amplitude)
         whole = self._whole
         return whole[1] * math.log1p(amplitude / whole[0]) if whole else amplitude
 
     def amplitude_at(self, grade: float) -> float:
         """The amplitude at a grade."""
+        if math.isfinite(self.fades):
+            return math.copysign(self.fades * math.log1p(abs(grade) / self.fades), grade)
         whole = self._whole
         return whole[0] * math.expm1(grade / whole[1]) if whole else grade
 
+    def difference(self, amplitude: float) -> float:
+        """By how much an amplitude is changed for a tangent there: by a small grade; at the null of what fades to nothing
+        there by its whole step, for what is next to the null says nothing of what is beyond."""
+        if math.isfinite(self.fades) and amplitude == 0.0:
+            return self.step
+        here, step = self.grade(amplitude), TANGENT * self.grade(self.step)
+        low, high = self.limits
+        if not low <= self.null + self.amplitude_at(here + step) <= high:
+            step = -step
+        return self.amplitude_at(here + step) - amplitude
+
     def stretch(self, times: float) -> Parameter:
         """The same parameter with a step that is ``times`` as long by its grade, kept inside the limits; a step that doubles what
-        it acts on is long enough."""
-        if math.isfinite(self.doubles):
+        it acts on, or goes to where it begins to act, is long enough."""
+        if math.isfinite(self.doubles) or math.isfinite(self.fades):
             return self
         return replace(self, step=self.hold(self.amplitude_at(times * self.grade(self.step))) - self.null)
 
@@ -225,6 +244,8 @@ class Effect:
     )
     # (an amplitude, a value of the shape) -> what the amplitude is with it; the same where nothing is said
     reshape: Callable[[Parameter, float], Parameter] | None = field(default=None, repr=False)
+    # (an amplitude, (n, 2) depth and tip radius of measured drops, m) -> what it is once these are known
+    narrow: Callable[[Parameter, FloatArray], Parameter] | None = field(default=None, repr=False)
 
     def say(self, value: float) -> str:
         """What is wrong at a value of the first parameter, as a sentence without its end."""
@@ -237,6 +258,15 @@ class Effect:
     def for_campaign(self, campaign: Campaign) -> Effect:
         """The same effect with nulls, limits and priors of this campaign. Raises EffectError."""
         return replace(self, parameters=self.resolve(campaign))
+
+    def for_drops(self, measured: FloatArray) -> Effect:
+        """The same effect once depth and tip radius of all drops are measured, (n, 2) m."""
+        if self.narrow is None or not len(measured):
+            return self
+        narrow = self.narrow
+        return replace(
+            self, parameters=tuple(each if each.shape else narrow(each, measured) for each in self.parameters)
+        )
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:

@@ -255,6 +255,7 @@ def _check(file: Path, module: types.ModuleType) -> Effect:
         without=without,
         says=says,
         reshape=_function(file, module, "reshape", 2),
+        narrow=_function(file, module, "narrow", 2),
     )
 
 

@@ -67,9 +67,11 @@ def open_problem(
     drops = drops if drops is not None else observe_drops(campaign)[0]
     if not drops:
         raise InferenceError(campaign.folder, "drops", "no tracks to compare with; give tracks or videos")
-    resolved, numerics, reasons = resolve_effects(
-        campaign, effects, felt=any(isinstance(drop, ObservedImpact) for drop in drops)
-    )
+    felt = any(isinstance(drop, ObservedImpact) for drop in drops)
+    resolved, numerics, reasons = resolve_effects(campaign, effects, felt=felt)
+    filmed = [drop for drop in drops if isinstance(drop, ObservedDrop)]
+    reached = np.array([(drop.depth.max(), drop.drop.projectile.tip_radius) for drop in filmed])
+    resolved = {name: effect.for_drops(reached) for name, effect in resolved.items()}
     errors = {name: (each.amplitudes[0].step, each.amplitudes[0].prior.sd) for name, each in numerics.items()}
     groups: list[ProjectileGroup] = []
     observations: list[Observation] = []

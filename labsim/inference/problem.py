@@ -184,11 +184,17 @@ class Problem:
         if effect.change_setting is None or not effect.amplitudes:
             return False
         parameter = effect.amplitudes[0]
-        setting = self.state(self.groups[0])
+        values = {parameter.name: parameter.hold(parameter.step)}
         place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
-        changed = effect.apply(setting, {parameter.name: parameter.hold(parameter.step)}, place)
-        back = changed.replace(material=set_value(changed.material, read_value(setting.material)))
-        return back == setting
+
+        def rescales(group: ProjectileGroup) -> bool:
+            setting = self.state(group)
+            changed = effect.apply(setting, values, place)
+            return (
+                changed.replace(material=set_value(changed.material, read_value(setting.material))) == setting
+            )
+
+        return all(map(rescales, self.groups))  # only the largest tip feels a floor
 
     def acts_on_projectile(self, name: str) -> bool:
         """Whether an effect changes nothing of a drop but what acts on the projectile alone, so that films need no runs of it.

@@ -278,17 +278,6 @@ def test_the_floor_sets_in() -> None:
     assert floor.apply(base, {"depth": 5 * RADIUS}, place) == base
 
 
-def test_the_floor_is_where_it_is_said_to_be() -> None:
-    """The particles that are held still begin at the stated depth, at any spacing."""
-    from labsim.sph import particles as rows
-
-    for spacing in (RADIUS / 4, RADIUS / 8):
-        setting = EFFECTS["hard_floor"].apply(make_setting(spacing=spacing), {"depth": 1.5e-3}, last_place())
-        state, wall = rows.place_particles(setting)
-        top = state[rows.Z][wall & (state[rows.X] < RADIUS)].max()
-        assert -top - spacing / 2 == pytest.approx(1.5e-3, abs=1e-9)
-
-
 def test_effects_leave_each_other_alone() -> None:
     """Two effects in either order are the same setting, so that a pair has one meaning (the geometry goes first)."""
     base, place = make_setting(), last_place()

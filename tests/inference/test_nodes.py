@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labsim.diagnosis.unlisted.hats import make_effect
-from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, list_effects
+from labsim.effects import HalfNormal, LogNormal, Normal, Parameter, Uniform, list_effects
 from labsim.effects.terms import list_terms
 from labsim.inference.calibrate import warn_of_range
 from labsim.inference.emulation.forward import ResponseTable
@@ -93,6 +93,20 @@ def test_what_is_positive_counts_by_its_ratio_to_null():
             assert parameter.amplitude_at(parameter.grade(amplitude)) == pytest.approx(amplitude, rel=1e-14)
     assert plain.grade(0.7) == from_nothing.grade(0.7) == 0.7
     assert FACTOR.grade(0.0) == 0.0
+
+
+def test_what_does_nothing_near_its_null_counts_by_what_it_does():
+    """A floor 0.6 mm higher than where it is felt first; e times as much every 0.25 mm from there."""
+    floor = Parameter(
+        "depth", "m", 3e-3, (1e-3, 3e-3), Uniform(1e-3, 3e-3), -6e-4, "of a hard bottom", fades=2.5e-4
+    )
+    for amplitude in (0.0, -1e-4, -6e-4, -2e-3):
+        assert floor.amplitude_at(floor.grade(amplitude)) == pytest.approx(amplitude, rel=1e-12)
+    done = [1.0 - floor.grade(amplitude) / floor.fades for amplitude in (-8e-4, -1.05e-3, -1.3e-3)]
+    assert done[1] / done[0] == pytest.approx(math.e) and done[2] / done[1] == pytest.approx(math.e)
+    assert floor.difference(0.0) == floor.step  # a tangent over a twentieth of it would see next to nothing
+    assert floor.grade(floor.difference(-6e-4) - 6e-4) == pytest.approx(1.05 * floor.grade(floor.step))
+    assert floor.stretch(4.0) == floor
 
 
 @pytest.mark.parametrize("value", [0.051, 0.07, 0.125, 0.3, 0.6, 1.7, 5.0, 19.0])

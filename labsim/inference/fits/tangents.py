@@ -24,13 +24,7 @@ def linearise_at(
     """Every observation about a point. further : effects whose tangents at null are wanted too."""
     perturbations = {}
     for name, amplitude in {**{name: 0.0 for name in further}, **values}.items():
-        parameter = problem.effects[name].amplitudes[0]
-        step = 0.05 * parameter.grade(parameter.step)
-        here = parameter.grade(amplitude)
-        low, high = parameter.limits
-        if not low <= parameter.null + parameter.amplitude_at(here + step) <= high:
-            step = -step
-        step = parameter.amplitude_at(here + step) - amplitude
+        step = problem.effects[name].amplitudes[0].difference(amplitude)
         perturbations[name] = _stand(problem, {**values, name: amplitude + step}, step)
     nominal = _stand(problem, values)
     return tuple(
