@@ -28,7 +28,7 @@ def parameters(campaign):
     stated = campaign.sample.depth
     largest = max(radius for radius, _, _ in list_impacts(campaign))
     felt = min(0.9 * deepest_expected(campaign) + 0.5 * largest, 0.8 * stated)
-    low = min(largest, 0.5 * felt)
+    low = min(0.5 * largest, 0.5 * felt)
     return (
         Parameter(
             "depth",
