@@ -64,7 +64,9 @@ leaves = (
     "The deepest drops, those of the largest tips, stop short and sooner; all others are as they should be. It is felt only "
     "where the tip comes within half its radius of the floor."
 )
-remedy = "use a deeper sample, or slower drops: a tip that comes within half its radius of the bottom feels it"
+remedy = (
+    "use a deeper sample, or slower drops: a tip that comes within half its radius of the bottom feels it"
+)
 without = "in a deeper sample"
 references = ("Seguin, Bertho & Gondret (2008): influence of confinement on granular penetration by impact",)
 expect = {"penetration_depth": 1}
