@@ -36,10 +36,8 @@ class Dust:
     weakening: float = 0.0  # share of Σ that shear can take, and Y with it
     weakening_shear: float = 0.3  # plastic strain that takes half of that
     hardening: float = 0.0  # growth of Y per plastic strain
-    creep: tuple[float, float] = (
-        0.0,
-        1.0,
-    )  # c, τ (s): Σ (1 - c ln(1 + t/τ)) at a time t since contact, and Y with it
+    # c, τ (s): Σ (1 - c ln(1 + t/τ)) at a time t since contact, and Y with it
+    creep: tuple[float, float] = (0.0, 1.0)
 
     @property
     def law(self) -> np.ndarray:

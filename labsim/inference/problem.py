@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -183,26 +183,30 @@ class Problem:
         effect = self.effects[name]
         if effect.change_setting is None or not effect.amplitudes:
             return False
-        parameter = effect.amplitudes[0]
-        values = {parameter.name: parameter.hold(parameter.step)}
-        place = max(self.places.values(), key=lambda place: abs(place.sequence_fraction))
-
-        def rescales(group: ProjectileGroup) -> bool:
-            setting = self.state(group)
-            changed = effect.apply(setting, values, place)
-            return (
-                changed.replace(material=set_value(changed.material, read_value(setting.material))) == setting
-            )
-
-        return all(map(rescales, self.groups))  # only the largest tip feels a floor
+        return all(
+            changed.replace(material=set_value(changed.material, read_value(plain.material))) == plain
+            for plain, changed in self._take_step(name)
+        )
 
     def acts_on_projectile(self, name: str) -> bool:
         """Whether an effect changes nothing of a drop but what acts on the projectile alone, so that films need no runs of it.
         Those of accelerometers and pushes are simulated in any case."""
-        effect, setting = self._find(name), self.state(self.groups[0])
+        effect = self._find(name)
         if self.felt or self.pushed or effect.change_setting is None or not effect.amplitudes:
             return False
-        return acts_on_projectile(setting, self.change(name, effect.amplitudes[0].step)(setting))
+        return all(acts_on_projectile(plain, changed) for plain, changed in self._take_step(name))
+
+    def _take_step(self, name: str) -> Iterator[tuple[DropSetting, DropSetting]]:
+        """Of every projectile, for a floor is felt by the largest tip alone: its drop without an effect, and with one step of it
+        where the order of the drops counts most."""
+        effect, place = (
+            self._find(name),
+            max(self.places.values(), key=lambda each: abs(each.sequence_fraction)),
+        )
+        values = self.at(name, effect.amplitudes[0].step)
+        for group in self.groups:
+            plain = self.state(group)
+            yield plain, effect.apply(plain, values, place)
 
     def at(self, name: str, amplitude: float) -> dict[str, float]:
         """Values of an effect's parameters at an amplitude, kept inside the limits."""

@@ -67,14 +67,14 @@ def test_still_layers_begin_one_spacing_above_the_floor(depth: float) -> None:
 
 
 def test_a_floor_is_looked_for_where_a_tip_feels_it(shared_store: Path) -> None:
-    """Small rods do not feel it: what one group of drops does not show is no mere change of p_m."""
+    """Small rods do not feel it: what one group of drops does not show is no mere change of p_m, nor of the projectile."""
     problem, _ = prepare(read_campaign(CAMPAIGN), RunStore(shared_store), workers=1)
     floor = problem.effects["hard_floor"].amplitudes[0]
     deepest = max(float(drop.depth.max()) for drop in problem.drops)
     assert floor.null == pytest.approx(deepest + RADIUS, rel=0.02)
     assert floor.limits[0] < deepest < floor.null + floor.step < floor.null
     assert problem.affects_simulation("hard_floor") and not problem.rescales_p_m("hard_floor")
-    assert problem.rescales_p_m("sample_drift")
+    assert problem.rescales_p_m("sample_drift") and not problem.acts_on_projectile("hard_floor")
 
 
 def test_a_floor_that_another_code_hid_explains_all(shared_store: Path) -> None:
