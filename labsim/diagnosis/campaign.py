@@ -39,25 +39,23 @@ from ..inference.surface_rows import doubt_surface_rows
 from ..records import Campaign, FloatArray
 from ..runs.store import Progress, RunStore
 from .average import average_p_m
-from .explore import EXPLORED, explore, needs_exploration
+from .explore import EXPLORED, ROUGH, explore, needs_exploration
 from .gain import Gain, HeldOut, check_prediction, measure_gain, predict_held_out
 from .judge import PREDICTED, PRIOR_UNKNOWN, TEMPERATURE, Verdict, find_class, judge, weigh_prior
 from .misfit import Part, measure_misfit
 from .next_experiment import Suggestion, suggest, suggest_between_formulas
 from .pairs import confirm_pairs, refine_leading, return_to_singles
-from .screen import CLOSE, HALF, Score, Screening, draw_strengths, has_runs, list_confusable, screen
+from .screen import CLOSE, HALF, NARROW, Score, Screening, draw_strengths, has_runs, list_confusable, screen
 from .shapes import cause, lay_out_shapes, merge_variants
-from .unlisted.free_law import fit_hats, simulate_hats, weigh_beside
+from .unlisted.free_law import Hats, fit_hats, simulate_hats, weigh_beside
 from .unlisted.learned_law import LearnedLaw, learn_law
 from .unlisted.unknown import UnknownFit, fit_unknown
 from .untestable import Combination, Untestable, find_combination, list_untestable
 
 WORTHWHILE = 0.5  # ln Bayes factor below which the linear screening is answer enough
 MOST_RERUN = 4  # effects that cost runs, of the screening and of exploring
-ROUGH = 60.0  # the same of a fit on fingerprints, which are good to some twenty
 MOST_EXPLORED = 3
 MOST_VARIANTS = 2  # of one cause in shape; the screening is answer enough for the others
-NARROW = 15.0  # the same between effects whose order more runs may change
 MOST_REFINED = 2  # large effects with runs at three strengths and amplitudes about them
 
 
@@ -137,10 +135,15 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
     screening = screen(problem, nominal, np.random.default_rng(seed))
     p_value = min(1.0, 2.0 * min(screening.p_value, fit_p_value(nominal)))
     unknown = fit_unknown(problem, nominal)
+    # the laws without a name are those of drops; how much they explain is how far a cause has to come
+    failed = p_value < REJECTED and not problem.pushed and unknown.find_wobble(nominal) is None
+    hats = None
+    if failed and not problem.felt:
+        hats, unknown = leave_law_free(problem, nominal)
     fits = confirm_singles(problem, nominal, screening)
     explored: dict[str, Fit] = {}
     if needs_exploration(problem, nominal, fits, screening, unknown.evidence):
-        explored = explore(problem, nominal, screening, fits)
+        explored = explore(problem, nominal, screening, fits, unknown.evidence)
         fits = confirm_explored(problem, nominal, fits, explored, unknown.evidence)
     fits = confirm_known(problem, fits, known)
     fits = refine_best(problem, fits, unknown.evidence)
@@ -152,15 +155,11 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
     predicted = 1.0
     if p_value < REJECTED and rivals:
         predicted = check_leading(problem, leading, np.random.default_rng(seed))
-    # the laws without a name are those of drops
-    explained = problem.pushed or unknown.find_wobble(nominal) is not None
-    # two codes differ more in the force that accelerometers feel than such a law may say
-    explained |= problem.felt and bool(rivals) and min(fit_p_value(leading), predicted) >= DOUBTFUL
-    if not explained and p_value < REJECTED:
-        hats = simulate_hats(problem, nominal)
-        unknown = fit_unknown(problem, nominal, fit_hats(problem, nominal, hats))
-        if rivals:
-            unknown = replace(unknown, beside=weigh_beside(hats, leading))
+    if failed and problem.felt and not (rivals and min(fit_p_value(leading), predicted) >= DOUBTFUL):
+        # two codes differ more in the force that accelerometers feel than such a law may say where a cause explains the data
+        hats, unknown = leave_law_free(problem, nominal)
+    if hats is not None and rivals:
+        unknown = replace(unknown, beside=weigh_beside(hats, leading))
     verdict = judge(
         nominal,
         rivals,
@@ -180,6 +179,12 @@ def judge_campaign(problem: Problem, nominal: Fit, *, seed: int = 1, known: Sequ
     return Judgement(
         problem.campaign, problem, nominal, rivals, screening, unknown, verdict, p_value, predicted, best
     )
+
+
+def leave_law_free(problem: Problem, nominal: Fit) -> tuple[Hats, UnknownFit]:
+    """Runs of every hat, and what is unknown with the laws that they leave free among the rest."""
+    hats = simulate_hats(problem, nominal)
+    return hats, fit_unknown(problem, nominal, fit_hats(problem, nominal, hats))
 
 
 def _list_rough(problem: Problem) -> list[str]:

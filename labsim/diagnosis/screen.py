@@ -24,6 +24,7 @@ DRAWS = 20_000
 SPARE = 20  # draws for one inside all limits
 CONFUSABLE = 0.9  # cosine of fingerprints
 CLOSE = 30.0  # ln Bayes factors within which a screened effect is re-simulated
+NARROW = 15.0  # the same between hypotheses whose order more runs may change
 HALF = 0.5  # of the best gain, if that is less than CLOSE asks: large effects are not what screening or fingerprints say
 
 

@@ -161,6 +161,8 @@ class Problem:
             kept = table.integrated if integrated else kept
             entry = kept.setdefault(name, {}).setdefault(request.index, {})
             table.parameters[name] = self._find(name).amplitudes[0]
+            if not request.rough:
+                table.corrections.pop(name, None)  # until its trend is known there
             if features is not None and features_before is not None:
                 own = [
                     spacings(request.sparse, k, False).index(f)
@@ -276,6 +278,51 @@ class Problem:
         for number in range(len(self.groups)):
             for (name, amplitude, _), request in zip(wanted, changed, strict=True):
                 self._fill_change(number, request, name, amplitude)
+
+    def require_trend(self, name: str, log_p_m: float, amplitude: float) -> None:
+        """What a law on the projectile alone changes of films close about an estimate, without runs (deflection.py), and what
+        runs of it, wherever there are some, say more: that is small and smooth."""
+        about = amplitude_nodes(self._find(name), amplitude, around=True)
+        nodes = enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step)
+        for number, group in enumerate(self.groups):
+            own = [each for each in self.features if each.group == number]
+            if group.is_scan or not own:
+                continue
+            changes = own[0].table.changes.get(name, {})
+            trend = own[0].table.trends.setdefault(name, {})
+            for index in {*nodes, *changes}:
+                missing = {*(about if index in nodes else ()), *changes.get(index, ())} - {
+                    *trend.get(index, ())
+                }
+                if missing:
+                    self._fill_trend(number, own, name, index, sorted(missing))
+            whole = all(amplitude in trend[index] for index in changes for amplitude in changes[index])
+            for table in (each.table for each in own):
+                if whole and table.changes.get(name):
+                    table.corrections[name] = {
+                        index: {
+                            a: change - table.trends[name][index][a] for a, change in by_amplitude.items()
+                        }
+                        for index, by_amplitude in table.changes[name].items()
+                    }
+
+    def _fill_trend(
+        self, number: int, own: Sequence[RunFeatures], name: str, index: float, amplitudes: Sequence[float]
+    ) -> None:
+        wanted = [Request(self._variant(name, a), self.change(name, a), index) for a in amplitudes]
+        found = self.grid.deflect_runs(wanted, number)
+        plain = self._extract_plain(number, Request("", None, index))
+        for each, (table, before) in zip(own, plain, strict=True):
+            entry = table.trends.setdefault(name, {}).setdefault(index, {})
+            for amplitude, motions in zip(amplitudes, found, strict=True):
+                if motions is not None and before is not None:
+                    features = np.array([each.extract(run) for run in motions])
+                    entry[amplitude] = features - before.mean(axis=1)
+
+    def follows_trend(self, name: str) -> bool:
+        """Whether films know what an effect changes without runs, and by how much runs say more."""
+        films = [each for each in self.features if not self.groups[each.group].is_scan]
+        return bool(films) and all(name in each.table.corrections for each in films)
 
     def require_fingerprints(self, names: Sequence[str], log_p_m: float, text: str) -> None:
         """The base about a strength, and what each effect changes there by one step; by a step to the other side of its null

@@ -135,6 +135,21 @@ def test_effects_add_a_polynomial_that_vanishes_at_null():
     assert table.at(math.log(1200.0), speeds[1]).change("e", 1.5) == pytest.approx(0.675, rel=1e-12)
 
 
+def test_a_law_on_the_projectile_bends_as_it_does_without_runs():
+    """One run of it says a tenth more than the trend; between, the trend says how it goes. A run whose trend is not known yet
+    counts alone."""
+    speeds = np.log([0.2, 0.3, 0.4])
+    base = np.stack([sine_features() for _ in speeds])
+    table = ResponseTable(speeds, (0, 2), {0: base})
+    table.trends["e"] = {0: {a: np.full_like(base, a * a) for a in (1.0, 2.0, 3.0)}}
+    table.changes["e"] = {0: {2.0: np.full_like(base, 4.4)}}
+    place = table.at(math.log(1000.0), speeds[1])
+    assert place.change("e", 1.0) == pytest.approx(2.2, rel=1e-12)
+    table.corrections["e"] = {0: {2.0: np.full_like(base, 0.4)}}
+    for amplitude in (0.5, 1.0, 2.0, 2.5):
+        assert place.change("e", amplitude) == pytest.approx(amplitude**2 + 0.2 * amplitude, rel=1e-12)
+
+
 def test_a_power_of_a_factor_is_met_from_its_null_to_its_limit():
     """ln D of dust weakened by a factor falls with ln of the factor: exact on that scale, far off on the factor's own."""
     speeds = np.log([0.2, 0.3, 0.4])

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from types import MethodType, SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from labsim.effects import Normal, Parameter
 from labsim.inference.emulation.deflection import acts_on_projectile, deflect
+from labsim.inference.emulation.forward import ResponseTable
+from labsim.inference.emulation.grid import ProjectileGroup, Request, RunGrid
+from labsim.inference.emulation.nodes import enclosing_nodes
+from labsim.inference.problem import Problem
 from labsim.records import Material, Projectile
 from labsim.runs.parts import Motion
 from labsim.runs.store import RunStore
@@ -129,3 +137,50 @@ def test_only_laws_on_the_projectile_are_taken() -> None:
     assert not acts_on_projectile(
         plain, plain.replace(pore_gas=100.0, force_of_speed=((0.0, 0.0), (1.0, 1e-4)))
     )
+
+
+def test_one_run_and_the_trend_say_what_more_runs_would() -> None:
+    """A drag that grows with the square of the speed, known from one amplitude: four times as far a line is far off."""
+
+    def drag(amplitude: float):
+        table = tuple((v, 1e-3 * amplitude * v**2) for v in np.linspace(0, 1.2, 25))
+        return lambda setting: setting.replace(force_of_speed=table)
+
+    group = ProjectileGroup(BEAD, SPEEDS, is_scan=False, sparse=(0, 1, 3))
+    grid = RunGrid(None, None, [group])  # type: ignore[arg-type]
+    grid.setting = lambda group, speed, *_: set_drop(speed)  # type: ignore[method-assign]
+    strengths = enclosing_nodes(math.log(1300.0))
+    for index in strengths:
+        grid.runs[Request("", None, index).of(0)] = [fall(set_drop(speed)) for speed in SPEEDS]
+    table = ResponseTable(np.log(SPEEDS), group.sparse)
+
+    def extract(run: Motion) -> np.ndarray:
+        return np.log([run.penetration_depth, run.stopping_time])
+
+    def simulate(amplitude: float) -> np.ndarray:
+        runs = [fall(drag(amplitude)(set_drop(speed))) for speed in SPEEDS]
+        before = grid.runs[Request("", None, 0).of(0)]
+        return np.array([extract(run) - extract(old) for run, old in zip(runs, before, strict=True)])
+
+    step = Parameter("c", "1", 0.0, (0.0, 100.0), Normal(0.0, 1.0), 1.0, "of a test")
+    problem = SimpleNamespace(
+        groups=[group], grid=grid, campaign=SimpleNamespace(p_m_range=(300.0, 6000.0)), node_step=1.0,
+        features=[SimpleNamespace(group=0, table=table, extract=extract)], change=lambda name, a: drag(a),
+        _find=lambda name: SimpleNamespace(amplitudes=[step], kind="material"), _variant=lambda name, a: f"{name} {a}",
+        _extract_plain=lambda number, request: [
+            (table, np.array([[extract(run)] for run in grid.runs[request.of(number)]]))
+        ],
+    )  # fmt: skip
+    problem._fill_trend = MethodType(Problem._fill_trend, problem)
+    table.changes["drag"] = {0: {1.0: simulate(1.0)}}
+    assert not Problem.follows_trend(problem, "drag")
+    Problem.require_trend(problem, "drag", math.log(1300.0), 3.5)
+    assert Problem.follows_trend(problem, "drag")
+    truth = simulate(4.0)[1]
+    table.base = {index: np.zeros((len(SPEEDS), 2)) for index in strengths}
+    response = table.at(math.log(1000.0), math.log(SPEEDS[1]))
+    followed = response.change("drag", 4.0)
+    del table.corrections["drag"]
+    straight = response.change("drag", 4.0)
+    assert followed == pytest.approx(truth, rel=0.02)
+    assert np.all(np.abs(straight - truth) > 5 * np.abs(followed - truth))

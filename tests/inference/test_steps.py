@@ -69,11 +69,15 @@ def test_plain_steps_run_away_there(monkeypatch):
     assert fit.unsettled > 1.0 and warn_unsettled(fit)[0].startswith("the fit still asks for a step of")
 
 
-def test_a_start_that_is_too_low_is_not_followed(monkeypatch):
+@pytest.mark.parametrize("known", [True, False])
+def test_a_fit_on_what_is_known_asks_for_no_runs(monkeypatch, known):
     problem, middle = bend(monkeypatch)
-    fit = fitting.fit_hypothesis(problem, (), (middle + 0.33, {}), least=-100.0)
-    assert fit.log_p_m == middle + 0.33
-    assert set(problem.seen) == {middle + 0.33}
+    asked, based = [], []
+    monkeypatch.setattr(fitting, "_ask", lambda *_, **__: asked.append(True))
+    problem.require_base_about = based.append
+    fit = fitting.fit_hypothesis(problem, (), (middle + 0.33, {}), known=known)
+    assert fit.log_p_m == pytest.approx(middle, abs=1e-4)
+    assert bool(asked) is not known and bool(based) is known
 
 
 @pytest.mark.parametrize("hidden", [-1.5, -0.1, 0.4])

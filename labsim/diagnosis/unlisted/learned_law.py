@@ -22,28 +22,25 @@ from ...inference.fits.fitting import REJECTED, Fit, Hypothesis, find_leading, f
 from ...inference.fits.refine import list_large_effects, refine
 from ...inference.problem import Problem
 from ...records import FloatArray
-from ..explore import FACTORS, fit_from_strengths
+from ..explore import FACTORS, ROUGH, allow_behind, fit_from_strengths
 from ..gain import Gain, HeldOut, hold_out_folds, measure_gain, predict_held_out
 from ..pairs import LEAST_GAIN
-from ..screen import HALF
+from ..screen import NARROW
 from .free_law import EMBEDDED, SIZES, Marginal, Tangents, integrate
 from .hats import FreeLaw, add_terms, shape_at
 from .unknown import UnknownFit, log_mean
 
 MOST_WEIGHED = 4  # formulas that few runs are made of, beside the best of every place
-MOST_SIMULATED = (
-    4  # of them, those that get as far as the best by ROUGH: ln evidence, which few runs give to some twenty
-)
-ROUGH, ROUGH_SHARE = (
-    60.0,
-    0.01,
-)  # and a share of what is gained: mass that sticks gained 48 100 by few runs, 48 300 by more
+MOST_SIMULATED = 4  # of them, those that get as far as the best by ROUGH
+# a share of what is gained, where that is more than ROUGH: mass that sticks gained 48 100 by few runs, 48 300 by more
+ROUGH_SHARE = 0.01
 # other forms of a place, those that are weighed first: of fifteen forms of a force of depth the four best after runs of their own
 # were among these (p12)
 MOST_TRIED = 6
 MOST_SIBLINGS = 2  # of a place, likewise
 # what a layer changes has a peak where drops end in it, which few speeds miss: all are simulated
 PEAKED = "strength of depth"
+LINEAR = 0.25  # of a gain: the free law of w007's place gained 281, its formula, simulated, 370
 MOST_PARTS = 3  # terms, or terms and listed causes, of a formula
 MOST_REFINED = 2  # formulas: where runs bend, a large one was left 21 below in ln evidence
 # where nothing explains the data: terms begun anew, from each of FACTORS, with the best of these shares of their unit. At
@@ -132,7 +129,9 @@ def learn_law(
     chosen = [names for names, _ in choose_formulas(weighed, terms)]
     ranked = dict.fromkeys([names[0] for names, _ in weighed if len(names) == 1] + list(terms))
     ordered = {name: units[name] for name in ranked}
-    fits = fit_formulas(free, nominal, chosen, ordered, list_open_places(unknown), listed)
+    fits = fit_formulas(
+        free, nominal, chosen, ordered, list_open_places(unknown), listed, list_promises(unknown)
+    )
     formulas = []
     for fit in fits:
         if fit.evidence > nominal.evidence + LEAST_GAIN:
@@ -164,16 +163,24 @@ def fit_formulas(
     units: Mapping[str, float],
     open_places: Collection[str] = (),
     listed: Sequence[Fit] = (),
+    promises: Mapping[str, float] | None = None,
 ) -> list[Fit]:
     """Each from three strengths on few runs, and those that come furthest with runs of their own; best first, MOST_REFINED of
     them among runs about themselves. What takes no runs is first, from several sizes too where nothing explains the data: how far
     it leads is how far all others must.
 
     units : of all terms, those first that are weighed first; open_places : whose forms are tried in any case; listed : causes
-    that explain most, which a term may stand beside.
+    that explain most, which a term may stand beside; promises : ln evidence of the free laws of places. Where a formula explains
+    the data, only places that promise about as much have runs.
     """
 
-    sparse: list[Fit] = []
+    sparse, fits, searched = list[Fit](), list[Fit](), set[str]()
+
+    def comes_near(place: str) -> bool:
+        best = find_leading([*sparse, *fits], nominal)
+        margin = max(NARROW, LINEAR * (best.evidence - nominal.evidence))
+        promise = (promises or {}).get(place, math.inf)
+        return promise > best.evidence - margin or not _explains([best])
 
     def begin(chosen: Sequence[Hypothesis]) -> None:
         for names in chosen:  # before there are more runs, which few ones do not stand beside
@@ -191,11 +198,15 @@ def fit_formulas(
     if not _explains(sparse or [nominal]):
         again = [fit for (name,) in pushed for fit in _begin_anew(problem, nominal, name, units[name])]
         sparse = take_better([*sparse, *again])
-    begin([names for names in chosen if len(names) > 1])
-    fits, searched = list[Fit](), set[str]()
+
+    def is_worth(name: str) -> bool:
+        return (name,) in (*seen, *pushed) or comes_near(list_terms()[name].place)
+
+    begin([names for names in chosen if len(names) > 1 and all(map(is_worth, names))])
     if not _explains(sparse or [nominal]) and not _is_ahead(listed, find_leading(sparse, nominal)):
         fits = fit_siblings(problem, nominal, fits, sparse, units, searched=searched, free=True)
-    begin([names for names in singles if names not in seen and names not in pushed])
+    dear = [names for names in singles if names not in seen and names not in pushed]
+    begin([names for names in dear if is_worth(*names)])
     fits += _refine(problem, nominal, sparse, MOST_SIMULATED, fits)
     if not _explains(fits or [nominal]):
         best = find_leading(fits, nominal)
@@ -205,10 +216,11 @@ def fit_formulas(
             if _explains(fits):
                 return sorted(fits, key=lambda fit: -fit.evidence)
             best = find_leading(fits, nominal)
-        near = {fit.hypothesis for fit in sparse if fit.evidence > best.evidence - _allow(best, nominal)}
-        dear = [names for names in singles if names in near and names not in (*seen, *pushed)]
-        fits = take_better([*fits, *fit_anew(problem, nominal, dear, units)])
-    fits = fit_siblings(problem, nominal, fits, sparse, units, open_places, searched=searched)
+        least = best.evidence - allow_behind(best.evidence, nominal)
+        ahead = [fit.hypothesis for fit in sparse if fit.evidence > least and fit.hypothesis in dear]
+        fits = take_better([*fits, *fit_anew(problem, nominal, ahead, units)])
+    near = [place for place in open_places if comes_near(place)]
+    fits = fit_siblings(problem, nominal, fits, sparse, units, near, searched=searched)
     while not _explains(fits or [nominal]):
         further = fit_further(problem, [*fits[:1], *listed], [*fits, *sparse], units)
         if not further:
@@ -339,7 +351,7 @@ def fit_siblings(
     while True:
         explained = _explains(found)
         best = find_leading(found or sparse, nominal)
-        behind = ALIKE if explained else _allow(best, nominal)
+        behind = ALIKE if explained else allow_behind(best.evidence, nominal)
         begun = _list_places(found or sparse, () if explained else sparse, units, behind)
         if explained:
             further = _list_places(sparse, (), units, math.inf)
@@ -374,12 +386,6 @@ def fit_siblings(
         found = take_better([*found, *_refine(problem, nominal, take_better(siblings), MOST_SIBLINGS, found)])
 
 
-def _allow(best: Fit, nominal: Fit) -> float:
-    """How far behind the best in ln evidence a place's best term is, by few runs, where nothing explains the data, for it to be
-    begun anew and for the other forms to be tried."""
-    return max(ROUGH, (1.0 - HALF) * (best.evidence - nominal.evidence))
-
-
 def _rank_place(problem: Problem, place: str) -> int:
     """When a place has its turn: those whose laws take no runs first, and last those that take most."""
     if place == PEAKED:
@@ -390,14 +396,19 @@ def _rank_place(problem: Problem, place: str) -> int:
     return 0 if problem.acts_on_projectile(name) or not problem.affects_simulation(name) else 1
 
 
-def list_open_places(unknown: UnknownFit) -> list[str]:
-    """Places whose law, left free, explains about as much as that of the best place does: what stands there is a matter of its
-    form, which is then tried."""
-    alone = {
+def list_promises(unknown: UnknownFit) -> dict[str, float]:
+    """ln evidence of the law of every place, left free there alone."""
+    return {
         places[0]: unknown.evidences.get(name, -math.inf)
         for name, places in EMBEDDED.items()
         if len(places) == 1
     }
+
+
+def list_open_places(unknown: UnknownFit) -> list[str]:
+    """Places whose law, left free, explains about as much as that of the best place does: what stands there is a matter of its
+    form, which is then tried."""
+    alone = list_promises(unknown)
     ranked = sorted(alone, key=lambda place: -alone[place])
     return [place for place in ranked if alone[place] > alone[ranked[0]] - ALIKE]
 

@@ -33,13 +33,23 @@ EXPOSED = 8  # times that an instant is put right by the tip's depth: each leave
 Changes = dict[float, dict[float, FloatArray]]
 
 
+class Layout(NamedTuple):
+    """strengths : ln p_m of its nodes; grades : of the amplitudes at each, a null first; stacked : (amplitudes of all strengths
+    times speeds, m)."""
+
+    strengths: tuple[float, ...]
+    grades: tuple[tuple[float, ...], ...]
+    stacked: FloatArray
+
+
 @dataclass
 class ResponseTable:
     """Features of one group. base : {strength index: (speeds, m)}; changes : {effect: {strength index: {amplitude: (speeds, m)}}}
     where the amplitude is the parameter minus its null and the arrays are differences from the nominal model at all speeds.
     integrated : the same of laws on the projectile, from the nominal runs (deflection.py), taken where there are no changes;
-    fingerprints : at the few speeds, taken where there are neither. parameters : of effects whose amplitudes have a grade of
-    their own. absent : effects that are not at work in what the table stands for."""
+    fingerprints : at the few speeds, taken where there are neither. trends : like ``integrated``, close about an estimate, and
+    corrections : what changes say more, of laws on the projectile; both together are taken before all. parameters : of effects
+    whose amplitudes have a grade of their own. absent : effects that are not at work in what the table stands for."""
 
     log_speeds: FloatArray
     sparse: tuple[int, ...]
@@ -47,9 +57,14 @@ class ResponseTable:
     changes: dict[str, Changes] = field(default_factory=dict)
     integrated: dict[str, Changes] = field(default_factory=dict)
     fingerprints: dict[str, Changes] = field(default_factory=dict)
+    trends: dict[str, Changes] = field(default_factory=dict)
+    corrections: dict[str, Changes] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
     absent: frozenset[str] = frozenset()
     _stacks: dict[int, tuple[Mapping[float, FloatArray], FloatArray]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
+    _layouts: dict[tuple[str, int], tuple[Changes, tuple[int, Parameter | None], Layout]] = field(
         default_factory=dict, repr=False, compare=False
     )
 
@@ -84,6 +99,21 @@ class ResponseTable:
         """Where an amplitude of an effect lies on the scale on which features are interpolated."""
         return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude
 
+    def lay_out(self, name: str, runs: Changes) -> Layout:
+        """What an effect changes, laid out for interpolation; kept, since mappings only grow."""
+        state = sum(map(len, runs.values())), self.parameters.get(name)
+        known, before, laid = self._layouts.get((name, id(runs)), (None, None, None))
+        if laid is None or known is not runs or before != state:
+            by_strength = {index: runs[index] for index in runs if runs[index]}
+            grades = [
+                (0.0, *(self.grade(name, amplitude) for amplitude in each)) for each in by_strength.values()
+            ]
+            arrays = [array for each in by_strength.values() for array in each.values()]
+            stacked = np.concatenate(arrays) if arrays else np.empty((0, 0))
+            laid = Layout(tuple(_log_strengths(by_strength)), tuple(grades), stacked)
+            self._layouts[name, id(runs)] = runs, state, laid
+        return laid
+
     def stack(self, features: Mapping[float, FloatArray]) -> FloatArray:
         """The features of one mapping of this table as (its entries times speeds, m); kept, since mappings only grow."""
         # ids of a table that came from another process mean nothing: the mapping itself is compared
@@ -115,22 +145,33 @@ class Response:
 
     def change(self, name: str, amplitude: float) -> FloatArray:
         """What an effect adds to the features, (m,)."""
+        if name in self.table.corrections:
+            trend, more = self.table.trends[name], self.table.corrections[name]
+            return self._interpolate(name, trend, amplitude) + self._interpolate(name, more, amplitude)
         kept = next(kept for kept in self.table.kinds if name in kept)
-        runs, across = kept[name], self.across
         if kept is self.table.fingerprints:
             sparse = self.table.log_speeds[list(self.table.sparse)]
             across = interpolation_weights(sparse, self.log_speed)
-        indices = [index for index in runs if runs[index]]
-        if not indices:
+            return self._interpolate(name, kept[name], amplitude, across)
+        return self._interpolate(name, kept[name], amplitude)
+
+    def _interpolate(
+        self, name: str, runs: Changes, amplitude: float, across: FloatArray | None = None
+    ) -> FloatArray:
+        """Changes at this strength and an amplitude. across : weights of the speeds, if not those of the table."""
+        across = self.across if across is None else across
+        laid = self.table.lay_out(name, runs)
+        if not laid.strengths:
             raise ExtrapolationError("simulation", name, "every run with it failed; see labsim runs")
-        nodes = _log_strengths(indices)
         margin = 0.5 * math.log(STRENGTH_RATIO)
-        inside = min(max(self.log_p_m, min(nodes) - margin), max(nodes) + margin)
-        change = np.zeros(self.plain.size)
-        for index, weight in zip(indices, smooth_weights(nodes, inside), strict=True):
-            grades = [0.0, *(self.table.grade(name, each) for each in runs[index])]
-            shares = smooth_weights(grades, self.table.grade(name, amplitude))[1:]
-            change += weight * (np.outer(shares, across).ravel() @ self.table.stack(runs[index]))
+        inside = min(max(self.log_p_m, min(laid.strengths) - margin), max(laid.strengths) + margin)
+        grade = self.table.grade(name, amplitude)
+        along = smooth_weights(laid.strengths, inside)
+        shares = [
+            weight * smooth_weights(grades, grade)[1:]
+            for weight, grades in zip(along, laid.grades, strict=True)
+        ]
+        change: FloatArray = np.multiply.outer(np.concatenate(shares), across).ravel() @ laid.stacked
         return change
 
 

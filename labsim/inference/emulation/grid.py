@@ -370,6 +370,19 @@ class RunGrid:
                 self.integrated.add(key)
         return rest
 
+    def deflect_runs(self, wanted: Sequence[Request], number: int) -> list[list[Motion] | None]:
+        """Motions of films with laws on the projectile at one strength, from the nominal model's runs, which must be there; None
+        for what leaves what these know."""
+        base = self.stopped_runs(wanted[0].base, number)
+        if base is None:
+            return [None] * len(wanted)
+        asked = [
+            self._list_settings(replace(request, sparse=False, rough=False), number) for request in wanted
+        ]
+        found = deflect(cast("list[Motion]", base), asked)
+        complete = ([run for run in motions if run is not None] for motions in found)
+        return [motions if len(motions) == len(base) else None for motions in complete]
+
     def _list_settings(self, request: Request, number: int) -> list[DropSetting]:
         """Of one group, in the order of its speeds and spacings."""
         group, changed, settings = self.groups[number], request.variant != "", []

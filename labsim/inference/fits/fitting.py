@@ -97,15 +97,15 @@ def fit_hypothesis(
     around: bool = False,
     nuisances: Fit | None = None,
     iterations: int = ITERATIONS,
-    least: float = -math.inf,
+    known: bool = False,
 ) -> Fit:
     """Gauss-Newton from ``start`` = (ln p_m, amplitudes), with runs about each new estimate.
 
     A step that ends lower than it began, by more than LOWER, is halved until it does not, MOST_HALVED times at most.
     sparse : what effects change is taken from fingerprints. around : it is simulated at three strengths and amplitudes about the
     estimate, not one or two: what a large effect changes bends. nuisances : a fit whose nuisances are the starting values.
-    least : ln likelihood, priors included, of a start below which no step is taken.
-    iterations : most steps of the globals; with none they stay, and the nuisances alone are moved to their best.
+    iterations : most steps of the globals; with none they stay, and the nuisances alone are moved to their best. known : no runs
+    are made but of the nominal model: effects change what the runs that there are say, in proportion.
     """
     begin = tuple(each.begin() for each in problem.observations) if nuisances is None else nuisances.nuisances
     values = {name: hold(problem, name, start[1].get(name, 0.0)) for name in hypothesis}
@@ -114,7 +114,10 @@ def fit_hypothesis(
     share, settled, calm = 1.0, False, False
     gain = math.inf
     for iteration in range(iterations + 1):
-        _ask(problem, hypothesis, place.log_p_m, place.values, sparse=sparse, around=around)
+        if known:
+            problem.require_base_about(place.log_p_m)
+        else:
+            _ask(problem, hypothesis, place.log_p_m, place.values, sparse=sparse, around=around)
         there = solve_at(problem, place)
         if best is not None and there.log_posterior < best.log_posterior - LOWER:
             # posteriors compare where nuisances are at their best; the runs made since count for both
@@ -127,7 +130,7 @@ def fit_hypothesis(
             best, share, calm = there, 1.0, False
         else:
             share *= 0.5
-        if settled or share < 0.5**MOST_HALVED or best.log_posterior < least:
+        if settled or share < 0.5**MOST_HALVED:
             break
         place, settled = advance(problem, best, share)
         settled = settled and iteration > 0
@@ -193,9 +196,9 @@ def keep_strengths(problem: Problem, fit: Fit, log_p_m: float) -> tuple[FloatArr
     return problem.tracks.keep_strengths(fit.nuisances[0], fit.drops, change), *fit.nuisances[1:]
 
 
-def require_runs(problem: Problem, fit: Fit) -> None:
+def require_runs(problem: Problem, fit: Fit, *, sparse: bool = False) -> None:
     """Make sure that a problem has the runs that a fit, perhaps to another problem with the same effects, rests on."""
-    _ask(problem, fit.hypothesis, fit.log_p_m, fit.values, sparse=False, around=False)
+    _ask(problem, fit.hypothesis, fit.log_p_m, fit.values, sparse=sparse, around=False)
 
 
 def _ask(
@@ -209,17 +212,17 @@ def _ask(
 ) -> None:
     problem.require_base_about(log_p_m)
     indices: list[float] = [screening_node(log_p_m)] if sparse else nearest_nodes(log_p_m, problem.node_step)
-    if around:
-        indices = nodes_around(log_p_m)
-    wanted = [
-        (name, amplitude, index)
-        for name in hypothesis
-        if problem.affects_simulation(name)
+    wanted = []
+    for name in filter(problem.affects_simulation, hypothesis):
+        close = around and not problem.follows_trend(name)
         # on a straight line a crust of a fifth of a long step is off by a tenth of itself
-        for amplitude in amplitude_nodes(
-            problem.effects[name], values[name], sparse=sparse, around=around, bent=problem.felt
+        nodes = amplitude_nodes(
+            problem.effects[name], values[name], sparse=sparse, around=close, bent=problem.felt
         )
-        for index in indices
-    ]
+        strengths = nodes_around(log_p_m) if close else indices
+        wanted += [(name, amplitude, index) for amplitude in nodes for index in strengths]
     if wanted:
         problem.require_changes(wanted, " and ".join(hypothesis), sparse=sparse)
+    for name in hypothesis:
+        if not sparse and problem.affects_simulation(name) and problem.acts_on_projectile(name):
+            problem.require_trend(name, log_p_m, values[name])

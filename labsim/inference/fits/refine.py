@@ -18,13 +18,14 @@ MOVED = 0.5  # of its standard deviation, that asks for them once more
 
 def list_large_effects(problem: Problem, fit: Fit) -> list[str]:
     """Effects of a fit that change runs and are larger than LARGE, or change more of a record than LARGE_CHANGE where runs are
-    rough; not those of the numerics, whose runs cost too much."""
+    rough; not those of the numerics, whose runs cost too much, nor laws on the projectile, whose bend takes no runs."""
     if problem.pushed:
         return []  # what a rate changes of a push is smooth, and runs of amplitudes near each other differ by noise
     return [
         name
         for name, value in fit.values.items()
         if problem.affects_simulation(name)
+        and not problem.follows_trend(name)
         and problem.effects[name].kind != "numerics"
         and (
             abs(value) > LARGE * abs(problem.effects[name].amplitudes[0].step)
