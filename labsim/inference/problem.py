@@ -17,7 +17,7 @@ from ..sph import DropSetting
 from .emulation.deflection import acts_on_projectile
 from .emulation.forward import ResponseTable
 from .emulation.grid import Change, ProjectileGroup, Request, RunGrid, RunKey
-from .emulation.nodes import amplitude_nodes, enclosing_nodes, screening_node
+from .emulation.nodes import amplitude_nodes, enclosing_nodes, nearest_nodes, screening_node
 from .observations import Observation, RunFeatures
 from .observations.compacted_zone import CompactedZone, CompactedZones
 from .observations.linearised_drop import ErrorBudget
@@ -281,7 +281,8 @@ class Problem:
 
     def require_trend(self, name: str, log_p_m: float, amplitude: float) -> None:
         """What a law on the projectile alone changes of films close about an estimate, without runs (deflection.py), and what
-        runs of it, wherever there are some, say more: that is small and smooth."""
+        runs of it, wherever there are some, say more: that is small and smooth. Not where the estimate leads out of what is known
+        without runs."""
         about = amplitude_nodes(self._find(name), amplitude, around=True)
         nodes = enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step)
         for number, group in enumerate(self.groups):
@@ -296,15 +297,12 @@ class Problem:
                 }
                 if missing:
                     self._fill_trend(number, own, name, index, sorted(missing))
-            whole = all(amplitude in trend[index] for index in changes for amplitude in changes[index])
+            partly = {index for index in nodes if not {*about} <= {*trend.get(index, ())}}
             for table in (each.table for each in own):
-                if whole and table.changes.get(name):
-                    table.corrections[name] = {
-                        index: {
-                            a: change - table.trends[name][index][a] for a, change in by_amplitude.items()
-                        }
-                        for index, by_amplitude in table.changes[name].items()
-                    }
+                for index in partly:  # farther amplitudes would follow from nearer ones
+                    table.trends[name].pop(index, None)
+                if partly.isdisjoint(nearest_nodes(log_p_m, self.node_step, share=0.0)):
+                    table.correct(name)
 
     def _fill_trend(
         self, number: int, own: Sequence[RunFeatures], name: str, index: float, amplitudes: Sequence[float]

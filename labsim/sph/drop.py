@@ -19,7 +19,7 @@ from .kernels.lines import ROOM, WIDTH, make_lines, make_rows
 from .kernels.neighbours import Neighbours
 from .loop import load_loop
 from .materials import find_law
-from .particles import name_rows, place_particles
+from .particles import WALL_LAYERS, name_rows, place_particles
 from .profile import measure_distance
 from .run import DropRun, make_run
 from .setting import DropSetting, check_setting
@@ -38,6 +38,9 @@ BOOK_CLOSES = (
 )
 HALVINGS = 2  # of the step, where it does not close
 HELPED = 0.7  # of the error may be left by a halving; where more is left, the step is not the reason
+# tip radii above the bottom of the dust: nearer to it a drop is shortened by more than 0.3 % (effects/catalogue/hard_floor.py)
+FELT = 1.0
+DEEPER = 1.5  # times as much dust, for a drop that comes nearer
 
 
 @dataclass
@@ -59,13 +62,15 @@ def evolve(
     watch: Callable[[float, FloatArray], None] | None = None,
     steps_at_once: int = STEPS_AT_ONCE,
     planes: tuple[float, ...] = (),
+    lowest: float = math.inf,
 ) -> Evolution:
     """Move particles of any initial state (rows of ``fill_at_rest``, n) until ``setting.duration``, or past the stop.
 
     wall particles keep the velocity they have. body: height (m) and velocity (m/s, upwards) of the projectile's tip,
     then time and two zeros; far above the dust it is as good as absent. watch is called with time and state between
     compiled stretches of at most ``steps_at_once`` steps. planes: x (m) of mirrors besides the axis, walls of free slip
-    with all dust on one side; their distance must exceed the reach of the kernel. Raises SimulationError if the run blows up.
+    with all dust on one side; their distance must exceed the reach of the kernel. lowest: depth (m) of the tip at which the run
+    ends. Raises SimulationError if the run blows up.
     """
     numerics, material, projectile = setting.numerics, setting.material, setting.projectile
     axisymmetric = setting.geometry == "axisymmetric"
@@ -128,7 +133,7 @@ def evolve(
     made, builds, stop_step, limit = 0, 0, None, min([setting.duration, *path[0][-1:]])
     farthest = 1000 * (np.abs(dust[[rows.X, rows.Z]]).max() + setting.spacing)
     first_step = 0.0
-    while body[TIME] < limit:
+    while body[TIME] < limit and -body[TIP] < lowest:
         if not np.abs(state[[rows.X, rows.Z], :n]).max() < farthest:
             raise _blown_up(setting, made, body[TIME])
         source, twice_plane = _find_images(state[rows.X, :n], 2 * h + 2 * skin, mirrors)
@@ -143,7 +148,7 @@ def evolve(
         builds += 1
         allowed, begun = 0.45 * skin, state[rows.X, :n].copy()
         fresh = False
-        while allowed > LEAST * skin and body[TIME] < limit:
+        while allowed > LEAST * skin and body[TIME] < limit and -body[TIP] < lowest:
             if not fresh:
                 origin = state[[rows.X, rows.Z], :n].copy()
                 near, inner, body_origin = _find_near(
@@ -205,17 +210,49 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     the undisturbed surface. Where it starts deeper, there is no dust in the projectile.
 
     The book of energy judges the run: where it does not close, or where a point collapsed, the run is made again with half the
-    step, at most ``HALVINGS`` times and as long as that helps.
+    step, at most ``HALVINGS`` times and as long as that helps. A drop that would feel the bottom of the dust, where no depth of
+    it is stated, is made again in DEEPER times as much, if it may stop there. One that does not has not stopped.
 
     progress is called now and then with the time reached, in s. Raises SimulationError (setting out of range, or the
     run blew up: then the message names its parameters).
     """
     check_setting(setting)
+    if setting.depth is not None or setting.path[0].size:
+        return _simulate_closed(setting, progress)
+    lowest = _find_lowest(setting)
+    run = _simulate_closed(setting, progress, lowest)
+    if run.stopped or run.depth[-1] < lowest:
+        return run
+    deeper = setting.replace(depth=DEEPER * setting.extent[1])
+    check_setting(deeper)
+    if not _find_stop(run) < _find_lowest(deeper):
+        return run
+    return replace(_simulate_closed(deeper, progress, _find_lowest(deeper)), setting=setting)
+
+
+def _find_stop(run: DropRun) -> float:
+    """Depth (m) where a drop would stop if it were slowed down on as along its last tip radius."""
+    begin = np.searchsorted(run.depth, run.depth[-1] - run.setting.projectile.tip_radius)
+    lost = run.velocity[begin] ** 2 - run.velocity[-1] ** 2
+    way = run.depth[-1] - run.depth[begin]
+    return float(run.depth[-1] + way * run.velocity[-1] ** 2 / lost) if lost > 0.0 else math.inf
+
+
+def _find_lowest(setting: DropSetting) -> float:
+    """Depth (m) below which a tip feels the bottom."""
+    bottom = setting.extent[1] - WALL_LAYERS * setting.spacing
+    return bottom - FELT * setting.projectile.tip_radius
+
+
+def _simulate_closed(
+    setting: DropSetting, progress: Callable[[float], None] | None, lowest: float = math.inf
+) -> DropRun:
+    """A run whose book of energy closes, if halving the step makes it."""
     best: DropRun | None = None
     trouble: SimulationError | None = None
     for halvings in range(HALVINGS + 1):
         try:
-            run = _simulate_once(setting, setting.numerics.courant / 2**halvings, progress)
+            run = _simulate_once(setting, setting.numerics.courant / 2**halvings, progress, lowest)
         except SimulationError as error:
             trouble = trouble or error
             continue
@@ -230,14 +267,16 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     return replace(best, warnings=(*best.warnings, missing))
 
 
-def _simulate_once(setting: DropSetting, courant: float, progress: Callable[[float], None] | None) -> DropRun:
+def _simulate_once(
+    setting: DropSetting, courant: float, progress: Callable[[float], None] | None, lowest: float
+) -> DropRun:
     began = time.perf_counter()
     dust, wall = place_particles(setting)
     body = start_body(setting)
     watch = None if progress is None else lambda reached, state: progress(reached)
     _fill_elastic(setting, dust)
     stepped = setting.replace(numerics=replace(setting.numerics, courant=courant))
-    result = evolve(stepped, dust, wall, body, watch)
+    result = evolve(stepped, dust, wall, body, watch, lowest=lowest)
     per_unit = 2 * math.pi if setting.geometry == "axisymmetric" else 1.0
     return make_run(
         setting, result.log, result.stop_step, result.at_stop, result.state,

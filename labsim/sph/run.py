@@ -126,7 +126,10 @@ def make_run(
     warnings = []
     if stop_step is None:
         what = "reach the end of its path" if led else "stop"
-        warnings.append(f"did not {what} within {setting.duration * 1e3:.3g} ms")
+        within = f"{setting.duration * 1e3:.3g} ms"
+        if log[-1, 0] < setting.duration:
+            within = f"{setting.extent[1] * 1e3:.3g} mm of dust"
+        warnings.append(f"did not {what} within {within}")
     warnings += law.find_warnings(setting, *rows.name_rows(setting, at_stop))
 
     brought = body_mass * setting.impact_speed

@@ -184,3 +184,30 @@ def test_one_run_and_the_trend_say_what_more_runs_would() -> None:
     straight = response.change("drag", 4.0)
     assert followed == pytest.approx(truth, rel=0.02)
     assert np.all(np.abs(straight - truth) > 5 * np.abs(followed - truth))
+
+
+def test_a_trend_may_end_beside_an_estimate_not_at_it() -> None:
+    """Soft dust that a law leads through is left out; where it is next to the estimate, the law has runs about itself."""
+    law = ResponseTable(np.log(SPEEDS), (0, 1, 3), changes={"law": {0: {1.0: np.ones((4, 2))}}})
+    group = ProjectileGroup(BEAD, SPEEDS, is_scan=False, sparse=(0, 1, 3))
+    problem = SimpleNamespace(
+        groups=[group], campaign=SimpleNamespace(p_m_range=(300.0, 6000.0)), node_step=1.0,
+        features=[SimpleNamespace(group=0, table=law)],
+        _find=lambda name: SimpleNamespace(
+            amplitudes=[Parameter("c", "1", 0.0, (0.0, 9.0), Normal(0.0, 1.0), 1.0, "of a test")], kind="material"
+        ),
+    )  # fmt: skip
+    nodes = enclosing_nodes(math.log(1300.0))
+
+    def fill(number, own, name, index, amplitudes) -> None:
+        known = law.trends[name].setdefault(index, {})
+        known |= {a: np.full((4, 2), a) for a in amplitudes if index not in through}
+
+    problem._fill_trend = fill
+    through = {nodes[1]}
+    Problem.require_trend(problem, "law", math.log(1300.0), 1.5)
+    assert not law.corrections and nodes[1] not in law.trends["law"]
+    law.trends.clear()
+    through = {nodes[0]}
+    Problem.require_trend(problem, "law", math.log(1300.0), 1.5)
+    assert set(law.trends["law"]) == {*nodes[1:]} and np.all(law.corrections["law"][0][1.0] == 0.0)

@@ -12,6 +12,7 @@ import pytest
 
 from labsim.errors import SimulationError
 from labsim.records import Material, Projectile
+from labsim.runs.store import require_stopped
 from labsim.sph import DropSetting, Numerics, _jit, check_setting, particles, simulate
 from labsim.sph import drop as drop_module
 from labsim.sph.materials import porous_dust
@@ -230,14 +231,15 @@ def test_four_spacings_across_the_tip_will_do():
 
 
 def test_dust_that_hardly_holds_together_comes_to_an_end():
-    """A twentieth of the tensile strength in soft dust: after the stop a point collapses, and its steps become ever shorter. The
-    motion up to the stop is known by then, and the run ends there."""
+    """A twentieth of the tensile strength in soft dust, 9.7 mm of it, whose bottom stops the drop: then a point collapses, and
+    its steps become ever shorter. The motion up to the stop is known by then, and the run ends there."""
     setting = DropSetting(
         Projectile("hemisphere", 0.5e-3, 3.3249e-6),
         1.419857,
         Material(p_m=500.0, tensile_log10_a=2.8 + math.log10(0.05)),
         spacing=1e-4,
         after_stop=0.16,
+        depth=9.7e-3,
     )
     run = simulate(setting)
     assert run.stopped and run.steps < 20_000
@@ -275,6 +277,28 @@ def test_clamp_near_the_upper_limit_is_reported():
     run = simulate(a_drop(material=weak, duration=1e-3, depth=a_drop().extent[1]))
     assert any("φ2" in warning and "%" in warning for warning in run.warnings)
     assert any("did not stop" in warning for warning in run.warnings)
+
+
+def test_a_drop_that_would_feel_the_bottom_gets_deeper_dust(monkeypatch):
+    """Mass that sticks carries the tip farther than its box was made for: the same depth as in dust that is deep anyway."""
+    heavy = a_drop(mass_of_depth=((0.0, 0.0), (2e-3, 9.0 * a_drop().projectile.mass)))
+    box = heavy.extent[1]
+    found, deep = simulate(heavy), simulate(heavy.replace(depth=2 * box))
+    assert found.stopped and found.setting == heavy and not found.warnings
+    assert found.penetration_depth == pytest.approx(deep.penetration_depth, rel=1e-3)
+    monkeypatch.setattr(drop_module, "FELT", -100.0)
+    stopped_by_bottom = simulate(heavy)
+    assert stopped_by_bottom.penetration_depth < 0.95 * found.penetration_depth
+
+
+def test_a_drop_that_nothing_stops_ends_above_the_bottom():
+    """It is no drop that stopped at the bottom of its box."""
+    pulled = a_drop(force_of_depth=((0.0, -0.1), (1.0, -0.1)))
+    run = simulate(pulled)
+    assert not run.stopped and run.velocity[-1] > 0.0 and run.depth[-1] < pulled.extent[1]
+    assert any("mm of dust" in warning for warning in run.warnings)
+    with pytest.raises(SimulationError, match="mm of dust did not stop the drop"):
+        require_stopped([run])
 
 
 @pytest.mark.parametrize(

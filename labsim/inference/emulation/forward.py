@@ -95,6 +95,17 @@ class ResponseTable:
         """What effects change, the kind that is taken first in front."""
         return self.changes, self.integrated, self.fingerprints
 
+    def correct(self, name: str) -> None:
+        """Say what runs of a law say more than its trend, wherever there are both."""
+        known = self.trends[name]
+        more: Changes = {
+            index: {a: change - known[index][a] for a, change in by_amplitude.items() if a in known[index]}
+            for index, by_amplitude in self.changes.get(name, {}).items()
+            if index in known
+        }
+        if any(more.values()):
+            self.corrections[name] = more
+
     def grade(self, name: str, amplitude: float) -> float:
         """Where an amplitude of an effect lies on the scale on which features are interpolated."""
         return self.parameters[name].grade(amplitude) if name in self.parameters else amplitude
