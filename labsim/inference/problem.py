@@ -283,7 +283,7 @@ class Problem:
         """What a law on the projectile alone changes of films close about an estimate, without runs (deflection.py), and what
         runs of it, wherever there are some, say more: that is small and smooth. Not where the estimate leads out of what is known
         without runs."""
-        about = amplitude_nodes(self._find(name), amplitude, around=True)
+        about, least = (amplitude_nodes(self._find(name), amplitude, around=more) for more in (True, False))
         nodes = enclosing_nodes(log_p_m, self.campaign.p_m_range, self.node_step)
         for number, group in enumerate(self.groups):
             own = [each for each in self.features if each.group == number]
@@ -297,7 +297,7 @@ class Problem:
                 }
                 if missing:
                     self._fill_trend(number, own, name, index, sorted(missing))
-            partly = {index for index in nodes if not {*about} <= {*trend.get(index, ())}}
+            partly = {index for index in nodes if not {*least} <= {*trend.get(index, ())}}
             for table in (each.table for each in own):
                 for index in partly:  # farther amplitudes would follow from nearer ones
                     table.trends[name].pop(index, None)
