@@ -299,8 +299,11 @@ class Problem:
                     self._fill_trend(number, own, name, index, sorted(missing))
             partly = {index for index in nodes if not {*least} <= {*trend.get(index, ())}}
             for table in (each.table for each in own):
-                for index in partly:  # farther amplitudes would follow from nearer ones
-                    table.trends[name].pop(index, None)
+                known = table.trends[name]
+                if not partly.isdisjoint(known):  # farther amplitudes would follow from nearer ones
+                    # a mapping of its own, for what is laid out of one only grows
+                    table.trends[name] = {index: known[index] for index in known if index not in partly}
+                table.corrections.pop(name, None)
                 if partly.isdisjoint(nearest_nodes(log_p_m, self.node_step, share=0.0)):
                     table.correct(name)
 

@@ -291,12 +291,9 @@ def require_stopped(runs: Sequence[DropRun | FailedRun]) -> list[DropRun]:
     done = require_runs(runs)
     for run in done:
         if not run.stopped:
-            short = run.time[-1] >= run.setting.duration
-            key, given = (
-                ("duration", f"{run.setting.duration:g} s was too short")
-                if short
-                else ("depth", f"{run.depth[-1] * 1e3:.3g} mm of dust did not stop the drop")
-            )
+            key, given = "duration", f"{run.setting.duration:g} s was too short"
+            if run.fell_through:
+                key, given = "depth", f"{run.depth[-1] * 1e3:.3g} mm of dust did not stop the drop"
             raise SimulationError("simulation", key, f"{given} for {say_setting(run.setting)}; raise it")
     return done
 

@@ -219,9 +219,8 @@ def simulate(setting: DropSetting, progress: Callable[[float], None] | None = No
     check_setting(setting)
     if setting.depth is not None or setting.path[0].size:
         return _simulate_closed(setting, progress)
-    lowest = _find_lowest(setting)
-    run = _simulate_closed(setting, progress, lowest)
-    if run.stopped or run.depth[-1] < lowest:
+    run = _simulate_closed(setting, progress, _find_lowest(setting))
+    if not run.fell_through:
         return run
     deeper = setting.replace(depth=DEEPER * setting.extent[1])
     check_setting(deeper)

@@ -70,6 +70,11 @@ class DropRun(Summarised):
         )
 
     @property
+    def fell_through(self) -> bool:
+        """Whether it ended before its time without a stop: where the bottom of the dust begins to be felt."""
+        return not self.stopped and bool(self.time[-1] < self.setting.duration)
+
+    @property
     def updates_per_s(self) -> float:
         return self.particles.r.size * self.steps / self.wall
 

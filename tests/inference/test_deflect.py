@@ -211,3 +211,6 @@ def test_a_trend_may_end_beside_an_estimate_not_at_it() -> None:
     through = {nodes[0]}
     Problem.require_trend(problem, "law", math.log(1300.0), 1.5)
     assert set(law.trends["law"]) == {*nodes[1:]} and np.all(law.corrections["law"][0][1.0] == 0.0)
+    through = {nodes[1]}
+    Problem.require_trend(problem, "law", math.log(1300.0), 4.5)  # it has moved out of what is known
+    assert "law" not in law.corrections and nodes[1] not in law.trends["law"]

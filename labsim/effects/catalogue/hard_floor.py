@@ -14,9 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from labsim.effects import Parameter, Uniform, all_pushed, deepest_expected, list_impacts
+from labsim.sph.drop import FELT
 from labsim.sph.particles import WALL_LAYERS
 
-FELT, BEGINS, FADES = 1.0, 0.4, 0.25  # tip radii below the deepest point of a tip
+BEGINS, FADES = 0.4, 0.25  # tip radii below the deepest point of a tip, as FELT
 YIELDS = 1  # layers of those held still, that lie above the floor
 SCALE = 0.9  # of a measured depth: the scale of a film may be off
 
